@@ -3,22 +3,27 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
+from robojackson.api.pack_parts import (
+    REFERENCE,
+    Facts,
+    beside,
+    evaluation_in,
+    machine_of,
+    motor_of_hinge,
+    write_pack,
+)
 from robojackson.api.policy_ingredients import policy_ingredients
 from robojackson.api.robots import load_robot
-from robojackson.errors import BadConfiguration, BadPolicy, StoreError
-from robojackson.files.file_tree import results_in
-from robojackson.files.foreign_file import read_json
+from robojackson.errors import BadPolicy
 from robojackson.formats.deploy.deployed_policy import (
     DeployedPolicy,
     chain_between,
-    places_in_mjcf,
 )
-from robojackson.formats.deploy.licence_passport import together, with_declared
+from robojackson.formats.deploy.licence_passport import with_declared
 from robojackson.formats.deploy.pack_files import pack_files
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
@@ -27,11 +32,9 @@ from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCAL
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import mode_of, observation_of
 from robojackson.rl.sim.feedforward import lead_of
-from robojackson.rl.sim.motors import Motors, gains, residual_scale
-from robojackson.robot.fall import Fall
+from robojackson.rl.sim.motors import residual_scale
 from robojackson.robot.model import Robot
 
-REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
 LAST_ACTION_SCALE = 0.5
 """As in the observation of mode `track`."""
 
@@ -44,7 +47,7 @@ def write_deploy_pack(
     robot: RobotLike | None = None,
     evaluation: FilePath | None = None,
     licences: Mapping[str, str] | None = None,
-) -> dict[str, Any]:
+) -> Facts:
     """Write a policy that sees what a robot measures by itself, as a pack that runs alone.
 
     Args:
@@ -69,29 +72,17 @@ def write_deploy_pack(
     path = Path(policy)
     found = load_policy(path)
     _require_onboard(found)
-    source = _beside(path, reference, REFERENCE, "--reference")
+    source = beside(path, reference, REFERENCE, "--reference")
     motion = ReferenceMotion.load(source)
     _require_same_motion(found, motion, source)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
-    evaluated = _evaluation(path, evaluation)
+    evaluated = evaluation_in(path.parent, evaluation)
     files = pack_files(parts, machine, ingredients, evaluated)
-    with results_in(Path(folder)) as tree:
-        for name, content in files.items():
-            tree.write(name, content)
-    rows = (evaluated or {}).get("passport") or []
-    return {
-        "files": sorted(files),
-        "robot": motion.robot,
-        "observations": parts.observation_size,
-        "layout_sha256": parts.layout_sha256,
-        "passport_cases": len(rows),
-        "weakest_case": min(rows, key=_strict_of)["case"] if rows else None,
-        "weakest_strict_success": min(map(_strict_of, rows)) if rows else None,
-        "licences": together(ingredients),
-        "unknown_licences": sorted({one.kind for one in ingredients if one.licence == "unknown"}),
-    }
+    written = write_pack(Path(folder), files, ingredients, evaluated)
+    layout = {"observations": parts.observation_size, "layout_sha256": parts.layout_sha256}
+    return {"robot": motion.robot, **layout, **written}
 
 
 def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) -> DeployedPolicy:
@@ -100,17 +91,9 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
     Raises:
         BadPolicy: it was trained for another robot, or the robot has hinges without a motor.
     """
-    control = control_of(policy, robot)
-    hinge, count = Motors.of(robot.model).hinge, len(robot.joint_names)
-    if sorted(hinge.tolist()) != list(range(count)):
-        raise BadPolicy(
-            f"robot {robot.description.name!r} has {len(hinge)} motors for {count} hinges: a "
-            "deploy pack needs one motor a hinge"
-        )
-    motor = np.argsort(hinge)
+    control, motor = control_of(policy, robot), motor_of_hinge(robot)
     lead = lead_of(robot, reference, control)
-    stiffness, damping = (each[motor] for each in gains(robot, control))
-    names, own = robot.keypoint_names, robot.actuation
+    names, count = robot.keypoint_names, len(robot.joint_names)
     body_of = robot.model.site_bodyid[robot.keypoint_sites]
     anchor = robot.model.body(body_of[names.index("head")]).name
     bodies = sorted({*body_of.tolist(), robot.model.body(robot.description.root_body).id})
@@ -119,21 +102,12 @@ def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) ->
         layers=layers,
         input_scale=scale,
         input_clip=CLIP,
-        model=robot.model,
-        reference=reference,
+        machine=machine_of(robot, reference, control),
         lead=np.zeros((len(reference), count)) if lead is None else lead[:, motor],
-        root=robot.description.root_body,
         anchor=anchor,
         chain=chain_between(robot.model, robot.description.root_body, anchor),
         bodies=tuple(robot.model.body(index).name for index in bodies),
-        default=robot.standing[7:],
         action_scale=residual_scale(robot, control)[motor],
-        stiffness=stiffness,
-        damping=damping,
-        torque_limit=Motors.of(robot.model).limit[motor],
-        speed_limit=own.speed_limit,
-        fall_tilt=Fall.of(robot).tilt,
-        places=places_in_mjcf(robot),
         facts=dict(policy.facts),
     )
 
@@ -185,7 +159,8 @@ def _require_onboard(policy: Policy) -> None:
     if law.get("feedback"):
         raise BadPolicy(
             "the policy was trained on the feedback along the reference, which needs the place and "
-            "the velocity that no real robot measures: train without track.control.feedback"
+            "the velocity that no real robot measures: train without track.control.feedback, or "
+            "write the feedback with estimates of both (export regulator_onboard --to deploy)"
         )
 
 
@@ -196,31 +171,3 @@ def _require_same_motion(policy: Policy, motion: ReferenceMotion, source: Path) 
             f"{source} is not the motion that the policy was trained on (sha256 "
             f"{str(learnt)[:12]}, here {poses_sha256(motion)[:12]}): give it with --reference"
         )
-
-
-def _beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path:
-    """Return the file given, or the one of that name beside the policy or one folder up."""
-    places = [Path(given)] if given else [f / name for f in (policy.parent, policy.parent.parent)]
-    path = next((place for place in places if place.is_file()), None)
-    if path is None:
-        raise StoreError(
-            f"no {name} at {' or '.join(map(str, places))}: give it with {option} FILE"
-        )
-    return path
-
-
-def _evaluation(policy: Path, given: FilePath | None) -> dict[str, Any] | None:
-    """Return the figures of an evaluation; None where there is none beside the policy."""
-    path = Path(given) if given else policy.parent / EVALUATION
-    path = path / EVALUATION if path.is_dir() else path
-    if given is None and not path.is_file():
-        return None
-    found = read_json(path, BadConfiguration)
-    if not isinstance(found, dict):
-        raise BadConfiguration(f"{path}: not what `robojackson evaluate` writes")
-    return found
-
-
-def _strict_of(row: Mapping[str, Any]) -> float:
-    """Return strict success of a row of the passport."""
-    return float(row["strict_success"])

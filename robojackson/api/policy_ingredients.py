@@ -36,13 +36,19 @@ def policy_ingredients(
         path: The policy's file.
         reference: The motion's file, beside or above which its landmarks lie if it is of a video.
     """
-    digest = hashlib.sha256(reference.read_bytes()).hexdigest()
+    return [
+        Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
+        *_start(str(policy.facts.get("start", UNKNOWN))),
+        *motion_ingredients(reference, robot),
+    ]
+
+
+def motion_ingredients(reference: Path, robot: Robot) -> list[Ingredient]:
+    """List the inputs of a pack beside what drives it: the motion's, the robot and the software."""
     return [
         clip_ingredient(reference),
         *_body_models(reference),
-        motion_ingredient(reference, digest),
-        Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
-        *_start(str(policy.facts.get("start", UNKNOWN))),
+        motion_ingredient(reference, _sha256(reference)),
         robot_ingredient(robot.description, robot.sha256),
         Ingredient("software", "run.py and the texts of the pack", "Apache-2.0", "RoboJackson"),
         *runner_ingredients(),

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robojackson.cli import cards
+from robojackson.cli import cards, console
+from robojackson.cli.stages import is_tracker
 from robojackson.errors import BadConfiguration
 from robojackson.files.foreign_file import require_file
 from robojackson.formats import registry
@@ -58,7 +59,7 @@ def export(
     from robojackson.api.motions import read_motion, require_another, write_motion
 
     began = time.monotonic()
-    if to == DEPLOY and source.suffix == POLICY_SUFFIX:
+    if to == DEPLOY and (source.suffix == POLICY_SUFFIX or is_tracker(source)):
         return _deploy(source, out, robot, pack or PackInputs(), began)
     if pack is not None and pack != PackInputs():
         raise BadConfiguration("--reference, --evaluation and --licence are for --to deploy")
@@ -86,17 +87,23 @@ def export(
 def _deploy(
     source: Path, out: Path, robot: str | None, pack: PackInputs, began: float
 ) -> dict[str, Any]:
-    """Write a deploy pack; its verdict names what is missing."""
+    """Write a deploy pack of a policy or a tracker; its verdict names what is missing."""
     from robojackson.api.deploy_pack import write_deploy_pack
+    from robojackson.api.feedback_pack import write_feedback_pack
 
-    made = write_deploy_pack(
-        source,
-        out,
-        reference=pack.reference,
-        robot=robot,
-        evaluation=pack.evaluation,
-        licences=pack.licences,
-    )
+    said: dict[str, Any] = {"evaluation": pack.evaluation, "licences": pack.licences}
+    if is_tracker(source):
+        if pack.reference is None:
+            raise BadConfiguration(
+                f"a pack of tracker {str(source)!r} needs the motion: --reference reference.parquet"
+            )
+        with console.stages() as progress:
+            made = write_feedback_pack(
+                str(source), pack.reference, out, robot=robot, progress=progress, **said
+            )
+    else:
+        made = write_deploy_pack(source, out, reference=pack.reference, robot=robot, **said)
+    made = dict(made)
     missing = _open_points(made)
     kind = "incomplete" if missing else "written"
     sentence = "The pack runs without RoboJackson. " + (

@@ -27,7 +27,10 @@ class ExportCommand(TyperCommand):
 def export(
     motion: Annotated[
         Path,
-        typer.Argument(help="reference.parquet of a robot, smpl.parquet of a person, or a policy."),
+        typer.Argument(
+            help="reference.parquet of a robot, smpl.parquet of a person, a policy, or for deploy "
+            "the tracker regulator_onboard."
+        ),
     ],
     to: Annotated[str, typer.Option(help="The format.")],
     out: Annotated[
@@ -36,7 +39,7 @@ def export(
     robot: MotionRobot = None,
     reference: Annotated[
         Path | None,
-        typer.Option(help="deploy: the policy's motion, where it is not beside the policy."),
+        typer.Option(help="deploy: the motion; needed where it is not beside the policy."),
     ] = None,
     evaluation: Annotated[
         Path | None,

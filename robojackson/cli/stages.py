@@ -181,7 +181,7 @@ def evaluate(
     """Evaluate a policy or a tracker; with a folder, also write its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
     from robojackson.api.trackers import load_tracker
-    from robojackson.cli.training_words import train_after, train_this
+    from robojackson.cli.training_words import pack_of, train_after, train_this
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
@@ -195,7 +195,8 @@ def evaluate(
         verdict.save(out)
     summary = to_json_types(verdict.summary)
     if tracker is not None:
-        following = train_this(reference)
+        estimated = tracker.description.root_state == "estimated"
+        following = pack_of(policy, reference, out) if estimated else train_this(reference)
     elif summary["verdict"]["kind"] == "dances":
         words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
         following = cards.command_line(*words)

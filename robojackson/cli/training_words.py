@@ -55,3 +55,14 @@ def _flat(values: Mapping[str, object], above: str = "") -> Iterator[tuple[str, 
             yield from _flat(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
+
+
+def pack_of(tracker: Path, reference: Path, out: Path | None) -> str:
+    """Return the command that writes the deploy pack of a tracker.
+
+    Args:
+        out: Folder of its evaluation; None where none was written.
+    """
+    given = () if out is None else ("--evaluation", out)
+    words = ("export", tracker, "--to", "deploy", "--reference", reference, *given)
+    return cards.command_line(*words, "-o", (out or Path()) / "pack")

@@ -172,6 +172,7 @@ class RobotDescription:
             the PD law move, for policies that see all, unitless.
         feedback_path: What the feedback keeps the robot on: the `reference`, or, where that falls,
             a path beside it that is `sampled` by simulations.
+        imu: Place of the accelerometer in the frame of the root body, metres.
         stand_pose: Hinge -> angle of the default stand, radians; zero where it is not named.
         simulation: How the physics is stepped.
         fall: When the robot has fallen.
@@ -205,6 +206,7 @@ class RobotDescription:
     feedforward: float = Field(default=0.0, ge=0, le=2)
     feedback: float = Field(default=0.0, ge=0, le=2)
     feedback_path: FeedbackPath = "reference"
+    imu: Offset = (0.0, 0.0, 0.0)
     stand_pose: Mapping[str, float] = Field(default_factory=dict)
     simulation: SimulationDescription = Field(default_factory=SimulationDescription)
     fall: FallRule = Field(default_factory=FallRule)
@@ -214,7 +216,8 @@ class RobotDescription:
 
 
 def description_sha256(description: RobotDescription) -> str:
-    """Return the digest of what a robot's YAML says, wherever its files lie and came from."""
-    named = {one.name for one in fields(description) if one.compare} - {"source"}
+    """Return the digest of what a robot's YAML says of its physics and its rules, wherever its
+    files lie and came from, and wherever its accelerometer sits."""
+    named = {one.name for one in fields(description) if one.compare} - {"source", "imu"}
     said = {name: value for name, value in asdict(description).items() if name in named}
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

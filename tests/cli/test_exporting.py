@@ -10,6 +10,7 @@ import pytest
 
 from robojackson.cli.cards import command_line
 from robojackson.cli.exporting import export
+from robojackson.cli.training_words import pack_of
 from robojackson.errors import RejectedReference, StoreError, UnknownName
 from robojackson.files import tables
 from robojackson.formats import (
@@ -137,3 +138,25 @@ def test_the_help_lists_every_format() -> None:
     listed = set(re.findall(r"[\w-]+", in_process("export", "--help").out))
     declared = {*registry.robot_exporters(), *registry.person_exporters()}
     assert listed >= declared | set(registry.policy_exporters())
+
+
+def test_a_pack_of_a_tracker_needs_the_motion_and_one_that_a_robot_can_run(
+    reference: Path, tmp_path: Path
+) -> None:
+    words = ("export", "regulator_onboard", "--to", "deploy", "-o", str(tmp_path / "pack"))
+    said = robojackson(*words)
+    assert said.code != 0
+    assert "needs the motion: --reference reference.parquet" in said.err
+    other = robojackson(*words, "--reference", str(reference))
+    assert other.code != 0
+    assert "drives robot 'g1', not 'humanoid'" in other.err
+    assert not (tmp_path / "pack").exists()
+
+
+def test_after_the_evaluation_of_a_tracker_comes_its_pack_with_the_evaluation(
+    reference: Path, tmp_path: Path
+) -> None:
+    shown = pack_of(Path("regulator_onboard"), reference, tmp_path)
+    assert shown.startswith("robojackson export regulator_onboard --to deploy --reference")
+    assert shown.endswith(f"--evaluation {tmp_path} -o {tmp_path}/pack")
+    assert "--evaluation" not in pack_of(Path("regulator_onboard"), reference, None)

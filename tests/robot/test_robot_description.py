@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.robot.description import description_sha256
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import ContactPoint, Robot, load_robot
 from tests.fixtures.robots import description
@@ -97,3 +98,10 @@ def test_the_sites_leave_the_stock_dynamics_as_they_are(robot: Robot, rng: np.ra
         mujoco.mj_step(model, data, 100)
         ends.append(data.qpos.copy())
     np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_the_place_of_the_accelerometer_ends_no_training_and_the_gains_do() -> None:
+    own = description("humanoid")
+    assert description_sha256(replace(own, imu=(0.1, 0.0, 0.0))) == description_sha256(own)
+    other = replace(own, robust_action_factor=2.0)
+    assert description_sha256(other) != description_sha256(own)

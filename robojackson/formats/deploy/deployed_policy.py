@@ -1,7 +1,6 @@
-"""Contents of a deploy pack: network, motion, limits and the layout of the observation.
+"""Contents of a deploy pack of a network: its layers, and the layout of its observation.
 
-All arrays are in the order of the robot's hinges, which is that of qpos. Metres, radians, seconds,
-newton-metres.
+All arrays are in the order of the robot's hinges, which is that of qpos. Radians.
 """
 
 import hashlib
@@ -13,9 +12,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.formats.deploy.deployed_machine import DeployedMachine
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.robot.mjcf import mjcf_path, read_spec
-from robojackson.robot.model import Robot
 
 Layers = tuple[tuple[np.ndarray, np.ndarray], ...]
 TERMS = ("command", "motion_anchor_ori_b", "base_ang_vel", "joint_pos", "joint_vel", "actions")
@@ -44,49 +42,43 @@ class DeployedPolicy:
     """A policy that uses only measurements of the robot itself, and the settings to run it.
 
     Attributes:
+        machine: Robot and motion.
         layers: (weight (in, out), bias (out,)); ReLU between them, tanh at the end. Inputs are in
             the order of `TERMS`, times `input_scale` and clipped to +-`input_clip`; outputs are
             residuals, -1..1.
-        model: The compiled robot.
-        reference: The motion.
         lead: Offset of the targets from the reference's angles at every step, rad.
-        root, anchor: Names of the body with the free joint, and of the one whose attitude is
-            observed.
+        anchor: Name of the body whose attitude is observed.
         chain: Links from the root to the anchor.
         bodies: Names of the bodies whose poses the policy file holds.
-        default: Angles that the observation and the action are relative to, rad.
         action_scale: Radians per unit of the action; a residual of 1 is equally large.
-        stiffness, damping: Gains of the PD law, Nm/rad and Nm s/rad.
-        torque_limit, speed_limit: Limits of every hinge, Nm and rad/s.
-        fall_tilt: Angle between the up axes of robot and reference that counts as a fall, rad.
-        places: Index of every hinge in the MJCF, in which welded hinges count, too.
         facts: Metadata of the training.
     """
 
+    machine: DeployedMachine
     layers: Layers
     input_scale: Float[np.ndarray, " D"]
     input_clip: float
-    model: mujoco.MjModel
-    reference: ReferenceMotion
     lead: Float[np.ndarray, "S J"]
-    root: str
     anchor: str
     chain: tuple[Link, ...]
     bodies: tuple[str, ...]
-    default: Float[np.ndarray, " J"]
     action_scale: Float[np.ndarray, " J"]
-    stiffness: Float[np.ndarray, " J"]
-    damping: Float[np.ndarray, " J"]
-    torque_limit: Float[np.ndarray, " J"]
-    speed_limit: Float[np.ndarray, " J"]
-    fall_tilt: float
-    places: tuple[int, ...]
     facts: dict[str, Any]
+
+    @property
+    def reference(self) -> ReferenceMotion:
+        """Return the motion."""
+        return self.machine.reference
+
+    @property
+    def default(self) -> Float[np.ndarray, " J"]:
+        """Return the angles that the observation and the action are relative to, rad."""
+        return self.machine.default
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Return the names of the hinges."""
-        return self.reference.joint_names
+        return self.machine.joints
 
     @property
     def terms(self) -> list[tuple[str, int]]:
@@ -104,15 +96,6 @@ class DeployedPolicy:
         """Return the digest of terms, joints and anchor, as the runner computes it."""
         text = json.dumps([self.terms, list(self.joints), self.anchor])
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def places_in_mjcf(robot: Robot) -> tuple[int, ...]:
-    """Return the index of every hinge among those of the MJCF, including the hinges that the
-    description welds: the motors of a robot keep their numbers when one of them is missing."""
-    spec = read_spec(mjcf_path(robot.description), robot.description)
-    hinge = mujoco.mjtJoint.mjJNT_HINGE
-    names = [joint.name for joint in spec.joints if joint.type == hinge]
-    return tuple(names.index(name) for name in robot.joint_names)
 
 
 def chain_between(model: mujoco.MjModel, root: str, anchor: str) -> tuple[Link, ...]:

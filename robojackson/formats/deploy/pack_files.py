@@ -1,13 +1,14 @@
 """The files of a deploy pack by name."""
 
+import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from robojackson.errors import BadConfiguration
 from robojackson.formats.beyondmimic import motion_arrays
 from robojackson.formats.containers import npz_archive
+from robojackson.formats.deploy.deployed_feedback import DeployedFeedback
 from robojackson.formats.deploy.deployed_policy import DeployedPolicy
 from robojackson.formats.deploy.licence_passport import (
     Ingredient,
@@ -15,22 +16,25 @@ from robojackson.formats.deploy.licence_passport import (
     passport_json,
     passport_markdown,
 )
-from robojackson.formats.deploy.pack_readme import pack_readme
+from robojackson.formats.deploy.pack_readme import Figures, feedback_readme, policy_readme
 from robojackson.formats.deploy.policy_graph import MOTION, policy_graph
 from robojackson.formats.deploy.robot_xml import robot_xml
-from robojackson.formats.deploy.settings_yaml import metadata, settings_yaml
+from robojackson.formats.deploy.settings_yaml import feedback_yaml, metadata, settings_yaml
 from robojackson.robot.body_states import require_same_joints
 from robojackson.robot.model import Robot
 from robojackson.robot.sampling import sampled
 
 RUNNER = Path(__file__).with_name("runner.py")
+FEEDBACK_RUNNER = Path(__file__).with_name("feedback_runner.py")
+RUNNER_OF_NETWORKS = "network_runner"
+"""Module of the runner of networks in a pack without one."""
 
 
 def pack_files(
     policy: DeployedPolicy,
     robot: Robot,
     ingredients: list[Ingredient],
-    evaluation: Mapping[str, Any] | None = None,
+    evaluation: Figures | None = None,
 ) -> dict[str, bytes]:
     """Return the content of every file of a pack.
 
@@ -45,26 +49,58 @@ def pack_files(
     require_same_joints(policy.reference, robot.model)
     motion = motion_arrays(sampled(policy.reference), robot.model)
     names = motion["body_names"].tolist()
-    if names[0] != policy.root:
-        raise BadConfiguration(f"root_body {policy.root!r} is not the first body, {names[0]!r}")
+    if names[0] != policy.machine.root:
+        raise BadConfiguration(
+            f"root_body {policy.machine.root!r} is not the first body, {names[0]!r}"
+        )
     columns = [names.index(name) for name in policy.bodies]
     held = {
         name: motion[name][:, columns] if name.startswith("body") else motion[name]
         for name in MOTION
     }
     about = metadata(policy)
-    rows: Sequence[Mapping[str, Any]] = (evaluation or {}).get("passport") or ()
-    files = {
+    own = {
         "policy.onnx": policy_graph(policy, held, about, "mjlab"),
         "policy_obs.onnx": policy_graph(policy, held, about, "plain"),
         "motion.npz": npz_archive.pack(motion),
         "deploy.yaml": settings_yaml(policy),
-        "robot.xml": robot_xml(robot),
         "run.py": RUNNER.read_bytes(),
-        "README.md": pack_readme(policy, evaluation, rows),
+        "README.md": policy_readme(policy, evaluation),
+    }
+    return own | _common(robot, ingredients, evaluation)
+
+
+def feedback_files(
+    feedback: DeployedFeedback,
+    robot: Robot,
+    ingredients: list[Ingredient],
+    evaluation: Figures | None = None,
+) -> dict[str, bytes]:
+    """Return the content of every file of a pack without a network; arguments and errors of
+    `pack_files`."""
+    require_same_joints(feedback.machine.reference, robot.model)
+    rows = feedback.archive()
+    runner = FEEDBACK_RUNNER.read_text(encoding="utf-8")
+    own = {
+        "feedback.npz": rows,
+        "deploy.yaml": feedback_yaml(feedback, hashlib.sha256(rows).hexdigest()),
+        "run.py": runner.replace("robojackson.formats.deploy.runner", RUNNER_OF_NETWORKS).encode(),
+        f"{RUNNER_OF_NETWORKS}.py": RUNNER.read_bytes(),
+        "README.md": feedback_readme(feedback, evaluation),
+    }
+    return own | _common(robot, ingredients, evaluation)
+
+
+def _common(
+    robot: Robot, ingredients: list[Ingredient], evaluation: Figures | None
+) -> dict[str, bytes]:
+    """Return the files of every pack."""
+    files = {
+        "robot.xml": robot_xml(robot),
         "LICENCES.md": passport_markdown(ingredients),
         "licences.json": passport_json(ingredients),
     } | licence_texts(robot.description)
+    rows: Sequence[Figures] = (evaluation or {}).get("passport") or ()
     if rows:
         files["passport.json"] = json.dumps(list(rows), indent=1).encode()
     return files

@@ -3,9 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from robojackson.formats.deploy.deployed_feedback import DeployedFeedback
+from robojackson.formats.deploy.deployed_machine import DeployedMachine
 from robojackson.formats.deploy.deployed_policy import DeployedPolicy
 
 Figures = Mapping[str, Any]
+COMMON = """\
+| `robot.xml` | the robot with its motors and stepping, without meshes |
+| `LICENCES.md`, `licences.json` | what it was made from, and what the licences allow |
+| `licences/` | the texts that go with the robot's model |
+"""
 FILES = """\
 | file | what |
 |---|---|
@@ -14,9 +21,34 @@ FILES = """\
 | `policy_obs.onnx` | the same function, `obs` in, `actions` out, for Unitree's C++ runner |
 | `motion.npz` | the motion for mjlab; the command of a control step is one row ahead |
 | `deploy.yaml` | joint order, gains, limits, scale, layout; Unitree's keys first |
-| `robot.xml` | the robot that it was trained on, without meshes |
-| `LICENCES.md`, `licences.json` | what it was made from, and what the licences allow |
-| `licences/` | the texts that go with the robot's model |
+"""
+FEEDBACK_FILES = """\
+| file | what |
+|---|---|
+| `run.py` | runs it: `pip install numpy mujoco`, `python run.py --view` |
+| `network_runner.py` | the part of it that packs with a network share: robot, start, stop |
+| `feedback.npz` | targets, gains and the path that they keep the robot on, a row a control step |
+| `deploy.yaml` | joint order, gains, limits, soles, accelerometer, odometry; Unitree's keys first |
+"""
+ESTIMATE = """\
+## What it measures and what it estimates
+
+A control step ahead, target = `targets` - (`gain` @ difference + `offset`), at most
+`feedback_limit` away from `targets`; the difference is that of the robot's state from `path_qpos`
+and `path_qvel`, position before velocity, as `mj_differentiatePos` orders it. Where `places` are
+numbers, that path is moved along the floor to the robot's own feet.
+
+No robot measures where its root is and how fast it travels: the pack estimates both. The sole
+points (`soles`) that carry the robot are taken to rest, or to slide as the motion's, so that
+joints, attitude and gyroscope give the root's velocity and height; the accelerometer, at `imu` in
+the root's frame, bridges slips and steps. The floor is level and starts where the robot stands.
+
+- `read()`: attitude wxyz, gyroscope in the root's axes, joint angles and speeds.
+- `force()`: the accelerometer in the root's axes, m/s^2, as a mean since the last call: average
+  what your sensor gives in a control step. At rest it is the opposite of gravity.
+
+In the figures below attitude, gyroscope and joints are exact and the accelerometer has noise of
+.1 m/s^2; read the passport's rows of noise and pushes before anything else.
 """
 SAFETY = """\
 ## Before a real robot
@@ -27,7 +59,7 @@ Nothing here has been on a real robot. All figures above are of simulations.
 2. Hang the robot from a gantry with slack for the dance, feet just off the floor, 3 m free around
    it, no person within reach, and a second person at the emergency stop of the robot itself.
 3. `Runner(robot=...)` drives any object with `joints` (names, in order), `read()` (attitude wxyz,
-   gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`.
+   gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`{and}.
    Your `drive` must keep the limits of `deploy.yaml`, as `SimulatedRobot.drive` does, and return
    after one control step: a loop that is late is another robot.
 4. First with the stop in your hand and damping alone (`drive` with stiffness 0), then the soft
@@ -35,31 +67,56 @@ Nothing here has been on a real robot. All figures above are of simulations.
 5. It stops by itself when robot and motion lean apart more than `stop_tilt`, when a joint is twice
    as fast as its limit, and when a value is no number; Ctrl-C and SIGTERM stop it as well. To stop
    is to damp: the robot sinks down. It neither stands up again nor catches itself.
-6. It refuses to start when names, sizes or order of the observation or of the joints differ from
-   what the policy was trained with. Do not pad or cut an observation to make it start.
+6. It refuses to start when {refused}.
 """
+OF_NETWORK = """\
+names, sizes or order of the observation or of the joints differ from
+   what the policy was trained with. Do not pad or cut an observation to make it start"""
+OF_FEEDBACK = """\
+joints differ in name or order, or when `feedback.npz` is of another pack"""
 
 
-def pack_readme(
-    policy: DeployedPolicy, figures: Figures | None, passport: Sequence[Figures]
-) -> bytes:
-    """Return the content of the file.
+def policy_readme(policy: DeployedPolicy, figures: Figures | None) -> bytes:
+    """Return the content of the file for a network.
 
     Args:
-        figures: Figures of the evaluation on stock physics; None where none was made.
-        passport: Rows of `evaluate --passport`; empty where none was made.
+        figures: Figures of the evaluation on stock physics, with `passport` where one was made;
+            None where there is none.
     """
-    reference = policy.reference
-    kind = "repeats" if reference.cyclic else "ends"
-    head = (
-        f"# Deploy pack: {reference.robot}, {len(reference) * reference.dt:.1f} s of motion that "
-        f"{kind}\n\nMade by `robojackson export --to deploy`. Control step "
-        f"{1e3 * reference.dt:g} ms, {len(policy.joints)} joints, {policy.observation_size} inputs "
-        f"(layout `{policy.layout_sha256[:12]}`), "
+    tail = (
+        f"{policy.observation_size} inputs (layout `{policy.layout_sha256[:12]}`), "
         "target = default_joint_pos + action_scale * action."
     )
-    parts = [head, FILES, _terms(policy), _evaluation(figures), _passport(passport), SAFETY]
-    return "\n\n".join(part.strip() for part in parts if part).encode() + b"\n"
+    safety = SAFETY.format(refused=OF_NETWORK, **{"and": ""})
+    own = [_head(policy.machine, tail), FILES.strip() + "\n" + COMMON, _terms(policy)]
+    return _text([*own, *_figures(figures), safety])
+
+
+def feedback_readme(feedback: DeployedFeedback, figures: Figures | None) -> bytes:
+    """Return the content of the file for feedback without a network; arguments of
+    `policy_readme`."""
+    tail = "linear feedback along the motion, without a network."
+    safety = SAFETY.format(refused=OF_FEEDBACK, **{"and": " and `force()`"})
+    files = FEEDBACK_FILES.strip() + "\n" + COMMON
+    return _text([_head(feedback.machine, tail), files, ESTIMATE, *_figures(figures), safety])
+
+
+def _text(parts: Sequence[str]) -> bytes:
+    return "\n\n".join(part.strip() for part in parts).encode() + b"\n"
+
+
+def _head(machine: DeployedMachine, tail: str) -> str:
+    reference = machine.reference
+    kind = "repeats" if reference.cyclic else "ends"
+    return (
+        f"# Deploy pack: {reference.robot}, {len(reference) * reference.dt:.1f} s of motion that "
+        f"{kind}\n\nMade by `robojackson export --to deploy`. Control step "
+        f"{1e3 * reference.dt:g} ms, {len(machine.joints)} joints, {tail}"
+    )
+
+
+def _figures(figures: Figures | None) -> list[str]:
+    return [_evaluation(figures), _passport((figures or {}).get("passport") or ())]
 
 
 def _terms(policy: DeployedPolicy) -> str:

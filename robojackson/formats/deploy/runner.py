@@ -15,7 +15,11 @@ from typing import Any
 import mujoco
 import mujoco.viewer
 import numpy as np
-import onnxruntime
+
+PARSER = argparse.ArgumentParser(description=__doc__)
+PARSER.add_argument("--seconds", type=float, default=10.0, help="of the dance")
+PARSER.add_argument("--soft-start", type=float, default=3.0, help="seconds, hung up")
+PARSER.add_argument("--view", action="store_true", help="MuJoCo's viewer, in real time")
 
 
 class SimulatedRobot:
@@ -55,6 +59,8 @@ class Runner:
     """The policy and its motion on a robot; refuses a pack whose parts do not fit each other."""
 
     def __init__(self, folder: Path = Path(__file__).parent, robot: Any = None) -> None:
+        import onnxruntime
+
         lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
         pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
         self.cfg = cfg = {key: json.loads(value) for key, _, value in pairs}
@@ -84,11 +90,9 @@ class Runner:
 
     def begin(self, row: int) -> None:
         """Start at a row of the motion, which is turned to where the robot faces."""
-        there, turn = np.zeros(4), np.zeros(4)
-        mujoco.mju_negQuat(there, self.roots[row, 3:])
-        mujoco.mju_mulQuat(turn, self.robot.read()[0], there)
+        self.row, self.tilt, self.action, turn = row, 0.0, np.zeros(len(self.default)), np.zeros(4)
+        mujoco.mju_mulQuat(turn, self.robot.read()[0], self.roots[row, 3:] * [1, -1, -1, -1])
         self.turn = turn * [1, 0, 0, 1] / np.hypot(turn[0], turn[3])
-        self.row, self.action, self.tilt = row, np.zeros(len(self.default)), 0.0
 
     def observe(self, quat: Any, gyro: Any, angle: Any, rate: Any) -> dict[str, np.ndarray]:
         """Return the terms of the observation, in their order."""
@@ -119,9 +123,9 @@ class Runner:
         return ""
 
 
-def main(seconds: float, soft_start: float, view: bool) -> str:
+def main(seconds: float, soft_start: float, view: bool, kind: type[Runner] = Runner) -> str:
     """Hang up, fade the gains in, move to the first pose, dance, damp; return why it ended."""
-    runner, stop = Runner(), list[str]()
+    runner, stop = kind(), list[str]()
     robot, dt = runner.robot, runner.cfg["step_dt"]
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append("stopped by hand"))
@@ -143,8 +147,4 @@ def main(seconds: float, soft_start: float, view: bool) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=10.0, help="of the dance")
-    parser.add_argument("--soft-start", type=float, default=3.0, help="seconds, hung up")
-    parser.add_argument("--view", action="store_true", help="MuJoCo's viewer, in real time")
-    sys.stdout.write(main(**vars(parser.parse_args())) + "\n")
+    sys.stdout.write(main(**vars(PARSER.parse_args())) + "\n")

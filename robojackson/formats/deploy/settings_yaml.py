@@ -10,68 +10,99 @@ from typing import Any
 
 import numpy as np
 
+from robojackson.formats.deploy.deployed_feedback import DeployedFeedback
+from robojackson.formats.deploy.deployed_machine import DeployedMachine
 from robojackson.formats.deploy.deployed_policy import DeployedPolicy
 
 UNITREE_TERMS = ("motion_command", "motion_anchor_ori_b", "base_ang_vel", "joint_pos_rel",
                  "joint_vel_rel", "last_action")  # fmt: skip
 """Names of the observation's terms in Unitree's runner."""
+Settings = dict[str, Any]
 MOST_TILT = 1.0
 """Largest angle between robot and motion at which the runner must stop, rad."""
 HEAD = """\
-# Made by `robojackson export --to deploy`; do not edit: run.py compares it with policy.onnx.
+# Made by `robojackson export --to deploy`; do not edit: run.py compares it with the other files.
 # Radians, seconds, newton-metres; arrays in the order of joint_names.
 """
 
 
 def settings_yaml(policy: DeployedPolicy) -> bytes:
-    """Return the content of the file."""
-    lines = [f"{key}: {json.dumps(value)}" for key, value in _settings(policy).items()]
-    return (HEAD + "\n".join(lines) + "\n").encode()
-
-
-def _settings(policy: DeployedPolicy) -> dict[str, Any]:
-    reference = policy.reference
-    default = _numbers(policy.default)
+    """Return the content of the file for a network."""
+    machine = _of_machine(policy.machine)
+    scale = _numbers(policy.action_scale)
     action = {
         "clip": None,
         "joint_names": [".*"],
-        "scale": _numbers(policy.action_scale),
-        "offset": default,
+        "scale": scale,
+        "offset": machine["default_joint_pos"],
         "joint_ids": None,
     }
-    return {
-        "joint_ids_map": list(policy.places),
-        "step_dt": reference.dt,
-        "stiffness": _numbers(policy.stiffness),
-        "damping": _numbers(policy.damping),
-        "default_joint_pos": default,
+    unitree = {
         "commands": {},
         "actions": {"JointPositionAction": action},
         "observations": _observations(policy),
-        "robot": reference.robot,
-        "joint_names": list(policy.joints),
-        "root_body_name": policy.root,
+    }
+    ours = {
         "anchor_body_name": policy.anchor,
-        "action_scale": _numbers(policy.action_scale),
-        "limits": limits(policy),
-        "stop_tilt": float(max(policy.fall_tilt, MOST_TILT)),
-        "cyclic": reference.cyclic,
-        "rows": len(reference),
+        "action_scale": scale,
         "command_leads_rows": 1,
         "observation_terms": _offsets(policy),
         "layout": [policy.layout_sha256, policy.observation_size],
     }
+    return _text(machine | unitree | ours)
 
 
-def limits(policy: DeployedPolicy) -> dict[str, list[float]]:
+def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
+    """Return the content of the file for feedback without a network.
+
+    Args:
+        sha256: Digest of feedback.npz.
+    """
+    ours = {
+        "cycle_offset": _numbers(feedback.machine.reference.cycle_offset),
+        "imu": list(feedback.imu),
+        "soles": [ball.as_row() for ball in feedback.soles],
+        "feet": [ball.as_row() for ball in feedback.feet],
+        "feedback_limit": _numbers(feedback.limit),
+        "odometry": feedback.odometry,
+        "feedback": sha256,
+    }
+    return _text(_of_machine(feedback.machine) | ours)
+
+
+def _text(settings: Settings) -> bytes:
+    lines = [f"{key}: {json.dumps(value)}" for key, value in settings.items()]
+    return (HEAD + "\n".join(lines) + "\n").encode()
+
+
+def _of_machine(machine: DeployedMachine) -> Settings:
+    """Return the settings of robot and motion, those of Unitree's runner first."""
+    reference = machine.reference
+    return {
+        "joint_ids_map": list(machine.places),
+        "step_dt": reference.dt,
+        "stiffness": _numbers(machine.stiffness),
+        "damping": _numbers(machine.damping),
+        "default_joint_pos": _numbers(machine.default),
+        "robot": reference.robot,
+        "joint_names": list(machine.joints),
+        "root_body_name": machine.root,
+        "limits": limits(machine),
+        "stop_tilt": float(max(machine.fall_tilt, MOST_TILT)),
+        "cyclic": reference.cyclic,
+        "rows": len(reference),
+    }
+
+
+def limits(machine: DeployedMachine) -> dict[str, list[float]]:
     """Return the limits of the targets, rad, of torques and of speeds."""
-    low, high = policy.model.jnt_range[1:].T
-    free = policy.model.jnt_limited[1:] == 0
+    low, high = machine.model.jnt_range[1:].T
+    free = machine.model.jnt_limited[1:] == 0
     return {
         "lower": _numbers(np.where(free, -1e3, low)),
         "upper": _numbers(np.where(free, 1e3, high)),
-        "torque": _numbers(policy.torque_limit),
-        "speed": _numbers(policy.speed_limit),
+        "torque": _numbers(machine.torque_limit),
+        "speed": _numbers(machine.speed_limit),
     }
 
 
@@ -80,8 +111,8 @@ def metadata(policy: DeployedPolicy) -> dict[str, str]:
     names = [name for name, _ in policy.terms]
     lists = {
         "joint_names": policy.joints,
-        "joint_stiffness": policy.stiffness,
-        "joint_damping": policy.damping,
+        "joint_stiffness": policy.machine.stiffness,
+        "joint_damping": policy.machine.damping,
         "default_joint_pos": policy.default,
         "command_names": ("motion",),
         "observation_names": names,
@@ -102,9 +133,9 @@ def metadata(policy: DeployedPolicy) -> dict[str, str]:
     }
 
 
-def _observations(policy: DeployedPolicy) -> dict[str, Any]:
+def _observations(policy: DeployedPolicy) -> Settings:
     """Return the terms as Unitree's runner reads them; their order is that of the observation."""
-    found: dict[str, Any] = {}
+    found: Settings = {}
     for name, (_, size) in zip(UNITREE_TERMS, policy.terms, strict=True):
         params = {"command_name": "motion"} if name.startswith("motion") else {}
         found[name] = {
@@ -116,7 +147,7 @@ def _observations(policy: DeployedPolicy) -> dict[str, Any]:
     return found
 
 
-def _offsets(policy: DeployedPolicy) -> list[dict[str, Any]]:
+def _offsets(policy: DeployedPolicy) -> list[Settings]:
     """Return names, sizes and offsets of the terms."""
     found, at = [], 0
     for name, size in policy.terms:

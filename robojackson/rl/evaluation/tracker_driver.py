@@ -37,7 +37,7 @@ class _Command:
     ) -> np.ndarray:
         if self._accelerometer is None or sim is not self._sim:
             self._sim, self._follower = sim, self._tracker.follow(self._robot, sim.n)
-            self._accelerometer = Accelerometer(sim)
+            self._accelerometer = Accelerometer(sim, self._robot.description.imu)
         ahead = tuple(
             following if k == 1 else self._clip.at(following.step + k - 1)
             for k in self._tracker.window

@@ -26,6 +26,12 @@ class Sites:
         return found
 
 
+def foot_sites(robot: Robot) -> Int[np.ndarray, " F"]:
+    """Return the sites of the feet's keypoints."""
+    result: np.ndarray = robot.keypoint_sites[np.unique(robot.contact_keypoints)]
+    return result
+
+
 class Feet:
     """The feet's keypoints of a robot, world frame, metres.
 
@@ -34,7 +40,7 @@ class Feet:
     """
 
     def __init__(self, robot: Robot) -> None:
-        sites = robot.keypoint_sites[np.unique(robot.contact_keypoints)]
+        sites = foot_sites(robot)
         self._sites, self.count = Sites(robot, sites), len(sites)
 
     def places(self, qpos: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N F 3"]:

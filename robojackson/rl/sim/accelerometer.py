@@ -1,5 +1,7 @@
 """The accelerometer of simulated robots. World frame, metres, seconds, unless noted."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -11,18 +13,44 @@ NOISE_M_S2 = 0.1
 
 
 class Accelerometer:
-    """Specific force at the roots of N robots, noise included; read it once every control step."""
+    """Specific force at the accelerometers of N robots, noise included; read it once every control
+    step.
 
-    def __init__(self, sim: Simulation, seed: int = 0) -> None:
-        self._sim, self._rng = sim, np.random.default_rng(seed)
-        self._velocity = sim.qvel[:, :3].copy()
+    Args:
+        place: Of the accelerometer in the frame of the root, m.
+    """
+
+    def __init__(
+        self, sim: Simulation, place: Sequence[float] = (0.0, 0.0, 0.0), seed: int = 0
+    ) -> None:
+        self._sim, self._place, self._rng = sim, np.array(place), np.random.default_rng(seed)
+        self._velocity = self._measure()
 
     def read(self) -> Float[np.ndarray, "N 3"]:
         """Return the mean since the last reading, or since the beginning, in the frames of the
         roots, m/s^2; the opposite of gravity for a robot at rest."""
-        sim = self._sim
-        change = (sim.qvel[:, :3] - self._velocity) / sim.dt - sim.model.opt.gravity
-        self._velocity = sim.qvel[:, :3].copy()
+        sim, before = self._sim, self._velocity
+        self._velocity = self._measure()
+        change = (self._velocity - before) / sim.dt - sim.model.opt.gravity
         force = np.einsum("nji,nj->ni", quat_to_matrix(sim.qpos[:, 3:7]), change)
         result: np.ndarray = force + NOISE_M_S2 * self._rng.standard_normal(force.shape)
         return result
+
+    def _measure(self) -> Float[np.ndarray, "N 3"]:
+        """Return the velocities of the accelerometers, world."""
+        swing = swing_velocity(self._sim.qpos, self._sim.qvel, self._place)
+        velocity: np.ndarray = self._sim.qvel[:, :3] + swing
+        return velocity
+
+
+def swing_velocity(
+    qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"], place: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "N 3"]:
+    """Return the velocities of a point of the root beside its origin, world, m/s.
+
+    Args:
+        place: Of the point in the frame of the root, m.
+    """
+    spin = np.cross(qvel[:, 3:6], place)
+    result: np.ndarray = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), spin)
+    return result

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.rl.sim.accelerometer import swing_velocity
 from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import point_jacobian, pose, tree
@@ -32,10 +33,11 @@ DOUBT_M_S, DOUBT_M = 0.05, 0.02
 
 @dataclass(frozen=True)
 class RootState:
-    """Estimates of N roots."""
+    """Estimates of N roots: place and velocity, and the velocity of the accelerometer beside it."""
 
     place: Float[np.ndarray, "N 3"]
     velocity: Float[np.ndarray, "N 3"]
+    swing: Float[np.ndarray, "N 3"]
 
 
 class LegOdometry:
@@ -47,6 +49,7 @@ class LegOdometry:
     def __init__(self, robot: Robot, dt: float) -> None:
         self._soles, self._dt = _Soles(robot), dt
         self._gravity = np.array(robot.model.opt.gravity)
+        self._imu = np.array(robot.description.imu)
         self._now: RootState | None = None
 
     def estimate(
@@ -68,6 +71,7 @@ class LegOdometry:
         carried = np.exp(-(points[:, :, 2] - lowest[:, None]) / LOW_M)
         carried /= carried.sum(1, keepdims=True)
         measured = np.einsum("nc,nci->ni", carried, sliding - speeds)
+        swing = swing_velocity(qpos, qvel, self._imu)
         if self._now is None:
             place = step.qpos[:, :3] - self._dt * step.qvel[:, :3]
             velocity = _corrected(step.qvel[:, :3], measured, 1.0, DOUBT_M_S)
@@ -75,11 +79,11 @@ class LegOdometry:
             if seen.force is None:
                 raise ValueError("leg odometry needs the accelerometer")
             turned = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), seen.force)
-            predicted = self._now.velocity + self._dt * (turned + self._gravity)
+            predicted = self._now.swing + self._dt * (turned + self._gravity) - swing
             velocity = _corrected(predicted, measured, SHARE, DOUBT_M_S)
             place = self._now.place + self._dt * velocity
         place[:, 2:] = _corrected(place[:, 2:], -lowest[:, None], SHARE, DOUBT_M)
-        self._now = RootState(place, velocity)
+        self._now = RootState(place, velocity, velocity + swing)
         qpos[:, :3], qvel[:, :3] = place, velocity
         return qpos, qvel
 

@@ -144,7 +144,8 @@ def test_a_held_pose_comes_before_itself(hipped: Pack) -> None:
     qpos, qvel = np.array(reference.qpos), np.array(reference.qvel)
     qpos[40:], qvel[40:] = qpos[40], 0.0
     parts = deployed_policy(hipped.policy, reference, hipped.robot)
-    parts = replace(parts, reference=replace(reference, qpos=qpos, qvel=qvel), lead=0 * parts.lead)
+    still = replace(parts.machine, reference=replace(reference, qpos=qpos, qvel=qvel))
+    parts = replace(parts, machine=still, lead=0 * parts.lead)
     before = targets_before(parts)
     np.testing.assert_array_equal(before[40:], qpos[40:, 7:])
     np.testing.assert_array_equal(before[1:40], qpos[:39, 7:])

@@ -21,7 +21,7 @@ from robojackson.rl.evaluation.starts import starts_of, summarise
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
-from tests.fixtures.deploy_policies import NEEDED, run_bare
+from tests.fixtures.deploy_policies import NEEDED, lose, run_bare
 from tests.formats.deploy.conftest import Pack
 
 MOST_LINES = 150
@@ -273,12 +273,7 @@ def test_it_stops_before_it_drives_a_robot_that_is_lost(pack: Pack, harm: str) -
     data = runner.robot.data
     assert runner.step() == ""
     began = data.time
-    if harm == "tilt":
-        data.qpos[3:7] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
-    elif harm == "speed":
-        data.qvel[8] = 3 * runner.cfg["limits"]["speed"][2]
-    else:
-        data.qpos[9] = np.nan
+    lose(runner, harm)
     assert runner.step() != ""
     assert data.time == began
 

@@ -9,7 +9,7 @@ import onnxruntime
 import pytest
 import yaml
 
-from robojackson.formats.deploy.deployed_policy import places_in_mjcf
+from robojackson.formats.deploy.deployed_machine import places_in_mjcf
 from robojackson.formats.deploy.settings_yaml import UNITREE_TERMS
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.model import load_robot

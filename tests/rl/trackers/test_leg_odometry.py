@@ -12,7 +12,7 @@ from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
-from robojackson.rl.sim.accelerometer import NOISE_M_S2, Accelerometer
+from robojackson.rl.sim.accelerometer import NOISE_M_S2, Accelerometer, swing_velocity
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.leg_odometry import LegOdometry
@@ -60,6 +60,28 @@ def test_a_push_is_noticed_though_the_soles_rest(robot: Robot, sway: ReferenceMo
     pushed = replace(quiet[0], force=quiet[0].force + [1.0 / sway.dt, 0.0, 0.0])
     _, qvel = odometry.estimate(pushed)
     assert 0.9 < np.linalg.norm(qvel[0, :3] - before) < 1.1
+
+
+def test_an_accelerometer_beside_the_root_tells_the_same(robot: Robot) -> None:
+    """Of a robot that turns fast, one that is taken to sit in the root misleads."""
+    motion, off = robot_motion("dance_b"), {}
+    clip, place = Clip(motion), (0.0, 0.1, 0.4)
+    beside = replace(robot, description=replace(robot.description, imu=place))
+    swing = swing_velocity(motion.qpos, motion.qvel, np.array(place))
+    change = np.diff(swing, axis=0, prepend=swing[:1]) / motion.dt
+    felt = np.einsum("nji,nj->ni", quat_to_matrix(motion.qpos[:, 3:7]), change)
+    for name, machine, more in (
+        ("root", robot, 0.0), ("beside", beside, 1.0), ("wrong", robot, 1.0),
+    ):  # fmt: skip
+        odometry, states = LegOdometry(machine, motion.dt), []
+        for i in range(80):
+            seen = measured(motion, i, clip)
+            assert seen.force is not None
+            seen = replace(seen, force=seen.force + more * felt[i])
+            states.append(np.concatenate([each[0, :3] for each in odometry.estimate(seen)]))
+        off[name] = np.array(states)
+    np.testing.assert_allclose(off["beside"], off["root"], atol=1e-9)
+    assert np.abs(off["wrong"] - off["root"]).max() > 0.01
 
 
 def test_a_copy_continues_by_itself(robot: Robot, sway: ReferenceMotion) -> None:

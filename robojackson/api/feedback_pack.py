@@ -1,0 +1,147 @@
+"""Write a deploy pack without a network: the feedback along a motion, from measurements alone."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
+from robojackson.api.pack_parts import Facts, evaluation_in, machine_of, motor_of_hinge, write_pack
+from robojackson.api.policy_ingredients import motion_ingredients
+from robojackson.api.robots import load_robot
+from robojackson.api.trackers import load_tracker
+from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.formats.deploy.deployed_feedback import Ball, DeployedFeedback
+from robojackson.formats.deploy.licence_passport import Ingredient, with_declared
+from robojackson.formats.deploy.pack_files import feedback_files
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.feedback.cached_feedback import feedback_of
+from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
+from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.motors import Motors
+from robojackson.rl.trackers import leg_odometry
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
+from robojackson.rl.trackers.tracker import Tracker
+from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
+
+Progress = Callable[[str, int, int], None]
+ODOMETRY = {
+    "low": leg_odometry.LOW_M,
+    "near": leg_odometry.NEAR_M,
+    "share": leg_odometry.SHARE,
+    "doubt_speed": leg_odometry.DOUBT_M_S,
+    "doubt_height": leg_odometry.DOUBT_M,
+    "foot_low": LOW_M,
+}
+
+
+def write_feedback_pack(
+    tracker: str | Tracker,
+    reference: FilePath,
+    folder: FilePath,
+    *,
+    robot: RobotLike | None = None,
+    evaluation: FilePath | None = None,
+    licences: Mapping[str, str] | None = None,
+    progress: Progress = lambda name, step, total: None,
+) -> Facts:
+    """Write a tracker that is feedback from a robot's own measurements, as a pack that runs alone.
+
+    Args:
+        tracker: A tracker whose `root_state` is estimated, or its name: `regulator_onboard`.
+        reference: The motion.
+        folder: Folder for the pack.
+        robot: The one that the motion was made for; None finds it.
+        evaluation: evaluation.json of `robojackson evaluate TRACKER REFERENCE`, whose figures and
+            passport go into the pack; None looks beside the motion.
+        licences: Licences of inputs by kind, where nothing records them: `{"clip": "CC-BY-4.0"}`.
+        progress: Called with a name, the steps that are done, and all, while the feedback is
+            computed.
+
+    Returns:
+        What was written: files, the passport's cases and its weakest, and what the licences allow.
+
+    Raises:
+        UnknownName: no such tracker.
+        BadPolicy: one that needs more than a robot measures, or a network of others; another robot.
+        StoreError: a file is missing or cannot be written.
+        BadConfiguration: a robot or a licence that cannot go into a pack, or another tracker's
+            evaluation.
+    """
+    who = load_tracker(tracker) if isinstance(tracker, str) else tracker
+    name = who.description.name
+    source = Path(reference)
+    motion = ReferenceMotion.load(source)
+    machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
+    machine = who.equip(machine)
+    if not isinstance(who, RegulatorTracker) or who.description.root_state != "estimated":
+        raise BadPolicy(
+            f"tracker {name!r} cannot go into a deploy pack: that takes a tracker of the network"
+            " `regulator` with `root_state: estimated`, such as regulator_onboard, or a policy that"
+            " was trained with --set track.observation=onboard"
+        )
+    evaluated = evaluation_in(source.parent, evaluation)
+    if evaluated is not None and evaluated.get("tracker") != name:
+        if evaluation is not None:
+            raise BadConfiguration(
+                f"{evaluation} is not an evaluation of {name!r}: make one with `robojackson "
+                f"evaluate {name} {source} --passport -o DIR`"
+            )
+        evaluated = None
+    parts = deployed_feedback(who.control, motion, machine, progress)
+    note = "computed from the robot's model and the motion"
+    law = Ingredient("tracker", f"the feedback, {name}", "own", note)
+    ingredients = with_declared([law, *motion_ingredients(source, machine)], licences or {})
+    files = feedback_files(parts, machine, ingredients, evaluated)
+    written = write_pack(Path(folder), files, ingredients, evaluated)
+    return {"robot": motion.robot, **written}
+
+
+def deployed_feedback(
+    control: ControlConfig, reference: ReferenceMotion, robot: Robot, progress: Progress
+) -> DeployedFeedback:
+    """Put together what a pack is made from, in the order of the hinges.
+
+    Raises:
+        BadPolicy: the robot has hinges without a motor, or no feedback.
+    """
+    motor, hinge = motor_of_hinge(robot), Motors.of(robot.model).hinge
+    found = feedback_of(robot, [reference], control, progress)
+    if found is None:
+        raise BadPolicy(f"robot {robot.description.name!r} has no feedback along a motion")
+    gains, lead = found.gains, lead_of(robot, reference, control)
+    targets = np.asarray(reference.qpos, float)[:, 7:][:, hinge]
+    targets = targets if lead is None else targets + lead
+    balls = tree(robot)
+    sites = foot_sites(robot)
+    model = robot.model
+    return DeployedFeedback(
+        machine=machine_of(robot, reference, control),
+        targets=targets[:, motor],
+        gain=gains.gain[:, motor],
+        offset=gains.offset[:, motor],
+        limit=found.limit[motor],
+        path_qpos=gains.qpos,
+        path_qvel=gains.qvel,
+        places=gains.places,
+        soles=_balls(robot, balls.ball_body, balls.ball_position, robot.contact_radii),
+        feet=_balls(robot, model.site_bodyid[sites], model.site_pos[sites], np.zeros(len(sites))),
+        imu=robot.description.imu,
+        odometry=ODOMETRY,
+    )
+
+
+def _balls(
+    robot: Robot,
+    bodies: Int[np.ndarray, " C"],
+    centres: Float[np.ndarray, "C 3"],
+    radii: Float[np.ndarray, " C"],
+) -> tuple[Ball, ...]:
+    names = [robot.model.body(int(body)).name for body in bodies]
+    return tuple(
+        Ball(name, (float(x), float(y), float(z)), float(radius))
+        for name, (x, y, z), radius in zip(names, centres, radii, strict=True)
+    )

@@ -1,0 +1,124 @@
+"""What the deploy packs of a policy and of a tracker have in common."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from robojackson.api.arguments import FilePath
+from robojackson.errors import BadConfiguration, BadPolicy, StoreError
+from robojackson.files.file_tree import results_in
+from robojackson.files.foreign_file import read_json
+from robojackson.formats.deploy.deployed_machine import DeployedMachine, places_in_mjcf
+from robojackson.formats.deploy.licence_passport import Ingredient, together
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.sim.motors import Motors, gains
+from robojackson.robot.fall import Fall
+from robojackson.robot.model import Robot
+
+Facts = Mapping[str, Any]
+"""Figures of an evaluation, or what was written."""
+REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
+
+
+def motor_of_hinge(robot: Robot) -> Int[np.ndarray, " J"]:
+    """Return the motor of every hinge.
+
+    Raises:
+        BadPolicy: the robot has hinges without a motor.
+    """
+    hinge, count = Motors.of(robot.model).hinge, len(robot.joint_names)
+    if sorted(hinge.tolist()) != list(range(count)):
+        raise BadPolicy(
+            f"robot {robot.description.name!r} has {len(hinge)} motors for {count} hinges: a "
+            "deploy pack needs one motor a hinge"
+        )
+    result: np.ndarray = np.argsort(hinge)
+    return result
+
+
+def machine_of(robot: Robot, reference: ReferenceMotion, control: ControlConfig) -> DeployedMachine:
+    """Return robot and motion in the order of the hinges.
+
+    Raises:
+        BadPolicy: the robot has hinges without a motor.
+    """
+    motor = motor_of_hinge(robot)
+    stiffness, damping = (each[motor] for each in gains(robot, control))
+    return DeployedMachine(
+        model=robot.model,
+        reference=reference,
+        root=robot.description.root_body,
+        default=robot.standing[7:],
+        stiffness=stiffness,
+        damping=damping,
+        torque_limit=Motors.of(robot.model).limit[motor],
+        speed_limit=robot.actuation.speed_limit,
+        fall_tilt=Fall.of(robot).tilt,
+        places=places_in_mjcf(robot),
+    )
+
+
+def beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path:
+    """Return the file given, or the one of that name beside the policy or one folder up.
+
+    Raises:
+        StoreError: there is none.
+    """
+    places = [Path(given)] if given else [f / name for f in (policy.parent, policy.parent.parent)]
+    path = next((place for place in places if place.is_file()), None)
+    if path is None:
+        raise StoreError(
+            f"no {name} at {' or '.join(map(str, places))}: give it with {option} FILE"
+        )
+    return path
+
+
+def evaluation_in(folder: Path, given: FilePath | None) -> Facts | None:
+    """Return the figures of an evaluation; None where none is given and none is in the folder.
+
+    Raises:
+        StoreError, BadConfiguration: the file is missing or no evaluation.
+    """
+    path = Path(given) if given else folder / EVALUATION
+    path = path / EVALUATION if path.is_dir() else path
+    if given is None and not path.is_file():
+        return None
+    found = read_json(path, BadConfiguration)
+    if not isinstance(found, dict):
+        raise BadConfiguration(f"{path}: not what `robojackson evaluate` writes")
+    return found
+
+
+def write_pack(
+    folder: Path,
+    files: Mapping[str, bytes],
+    ingredients: list[Ingredient],
+    evaluation: Facts | None,
+) -> Facts:
+    """Write the files of a pack; return what was written, its passport and its licences.
+
+    Raises:
+        StoreError: they cannot be written.
+    """
+    with results_in(folder) as tree:
+        for name, content in files.items():
+            tree.write(name, content)
+    rows = (evaluation or {}).get("passport") or []
+    weakest = min(rows, key=_strict_of, default=None)
+    return {
+        "files": sorted(files),
+        "passport_cases": len(rows),
+        "weakest_case": weakest and weakest["case"],
+        "weakest_strict_success": weakest and _strict_of(weakest),
+        "licences": together(ingredients),
+        "unknown_licences": sorted({one.kind for one in ingredients if one.licence == "unknown"}),
+    }
+
+
+def _strict_of(row: Facts) -> float:
+    """Return strict success of a row of the passport."""
+    return float(row["strict_success"])
