@@ -126,7 +126,7 @@ def deployed_feedback(
         limit=found.limit[motor],
         path_qpos=gains.qpos,
         path_qvel=gains.qvel,
-        places=gains.places,
+        places=found.feet.places(gains.qpos),
         soles=_balls(robot, balls.ball_body, balls.ball_position, robot.contact_radii),
         feet=_balls(robot, model.site_bodyid[sites], model.site_pos[sites], np.zeros(len(sites))),
         imu=robot.description.imu,

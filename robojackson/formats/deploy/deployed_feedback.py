@@ -35,7 +35,7 @@ class DeployedFeedback:
         gain, offset: Moves of the targets from a step on: -(gain @ difference + offset), rad.
         limit: The largest of these moves, rad.
         path_qpos, path_qvel: States that the difference is from.
-        places: Feet of these states, which move with the robot's own feet; NaN where they stay.
+        places: Feet of these states, which are moved along the floor to the robot's own feet.
         soles: Points that carry the robot.
         feet: Points that `places` are of.
         imu: Place of the accelerometer in the frame of the root.

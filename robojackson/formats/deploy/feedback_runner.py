@@ -81,9 +81,8 @@ class Runner(NetworkRunner):
         self.row, limit, apart = self.row + 1, self.cfg["feedback_limit"], np.zeros(self.model.nv)
         qpos, qvel = self.estimate(ahead, *measured)
         mujoco.mj_differentiatePos(self.model, apart, 1.0, now["path_qpos"], qpos)
-        if np.isfinite(now["places"][0, 0]):
-            feet, _, shares = self.points("feet", qpos, qvel, self.rule["foot_low"])
-            apart[:2] -= shares @ (feet - now["places"])[:, :2]
+        feet, _, shares = self.points("feet", qpos, qvel, self.rule["foot_low"])
+        apart[:2] -= shares @ (feet - now["places"])[:, :2]
         moved = now["gain"] @ [*apart, *(qvel - now["path_qvel"])] + now["offset"]
         target = ahead["targets"] - np.clip(moved, np.negative(limit), limit)
         fast = np.abs(measured[3]) > 2 * np.array(self.cfg["limits"]["speed"])

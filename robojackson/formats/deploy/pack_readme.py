@@ -35,8 +35,8 @@ ESTIMATE = """\
 
 A control step ahead, target = `targets` - (`gain` @ difference + `offset`), at most
 `feedback_limit` away from `targets`; the difference is that of the robot's state from `path_qpos`
-and `path_qvel`, position before velocity, as `mj_differentiatePos` orders it. Where `places` are
-numbers, that path is moved along the floor to the robot's own feet.
+and `path_qvel`, position before velocity, as `mj_differentiatePos` orders it. That path is moved
+along the floor so that its feet, `places`, are at the robot's own.
 
 No robot measures where its root is and how fast it travels: the pack estimates both. The sole
 points (`soles`) that carry the robot are taken to rest, or to slide as the motion's, so that

@@ -58,10 +58,10 @@ class LegOdometry:
         """Return the measured states with the estimates as place and velocity of the root.
 
         Args:
-            seen: Input of a tracker whose window begins with the next step; place and velocity of
+            seen: Input of a tracker whose window ends with the next step; place and velocity of
                 its root are not read.
         """
-        step = seen.window[0]
+        step = seen.window[-1]
         qpos, qvel = seen.qpos.copy(), seen.qvel.copy()
         qpos[:, :3] = qvel[:, :3] = 0.0
         points, speeds = self._soles.at(qpos, qvel)

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers.equipment import require_robot
 from robojackson.rl.trackers.leg_odometry import LegOdometry
@@ -24,7 +25,8 @@ class RegulatorTracker:
 
     def __init__(self, description: TrackerDescription, path: Path | None = None) -> None:
         self.description = description
-        self.window: tuple[int, ...] = (1,)
+        self._estimated = description.root_state == "estimated"
+        self.window: tuple[int, ...] = (0, 1) if self._estimated else (1,)
         self.control = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="sampled")
         self.sees_ahead = self.sees_travel = False
 
@@ -36,24 +38,42 @@ class RegulatorTracker:
     def follow(self, robot: Robot, n: int) -> Follower:
         """Return a follower of n robots."""
         require_robot(robot, self.description)
-        estimated = self.description.root_state == "estimated"
-        odometry = LegOdometry(robot, self.description.control_dt) if estimated else None
-        return _RegulatorFollower(robot, odometry)
+        kind = _EstimatingFollower if self._estimated else _RegulatorFollower
+        return kind(robot, self.description.control_dt)
 
 
 class _RegulatorFollower:
-    """N robots; the feedback has no memory, the odometry has."""
+    """N robots; the feedback has no memory."""
 
-    def __init__(self, robot: Robot, odometry: LegOdometry | None) -> None:
-        self._hinge, self._odometry = Motors.of(robot.model).hinge, odometry
+    def __init__(self, robot: Robot, dt: float) -> None:
+        self._hinge = Motors.of(robot.model).hinge
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
-        (step,) = seen.window
+        step = seen.window[-1]
         targets = step.angles(self._hinge)
         if step.feedback is not None:
-            state = (seen.qpos, seen.qvel)
-            if self._odometry is not None:
-                state = self._odometry.estimate(seen)
-            targets = targets + step.feedback(*state)
+            targets = targets + step.feedback(*self.state(seen))
         return targets
+
+    def state(self, seen: TrackerInput) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states that the feedback is from."""
+        return seen.qpos, seen.qvel
+
+
+class _EstimatingFollower(_RegulatorFollower):
+    """N robots and the odometry of each.
+
+    Where a robot is on the floor it cannot know for long: the feedback is from where its own feet
+    stand beside those of the reference.
+    """
+
+    def __init__(self, robot: Robot, dt: float) -> None:
+        super().__init__(robot, dt)
+        self._odometry, self._feet = LegOdometry(robot, dt), Feet(robot)
+
+    def state(self, seen: TrackerInput) -> tuple[np.ndarray, np.ndarray]:
+        """Return the measured states, and of the root what is estimated, beside the feet."""
+        qpos, qvel = self._odometry.estimate(seen)
+        qpos[:, :2] -= self._feet.apart(qpos, self._feet.places(seen.window[0].qpos))
+        return qpos, qvel

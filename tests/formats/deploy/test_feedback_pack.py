@@ -29,6 +29,7 @@ from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot, load_robot
 from tests.fixtures.deploy_policies import bare_packages, lose, run_bare, swaying
 from tests.fixtures.robots import stock
+from tests.rl.conftest import make_reference, sway_angles
 
 pytestmark = pytest.mark.xdist_group("feedback_pack")
 NAME, IMU = "stock_onboard", (0.1, -0.05, -0.1)
@@ -60,7 +61,12 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     folder, cyclic = tmp_path_factory.mktemp(request.param), request.param == "repeats"
     robot = load_robot(replace(stock().description, imu=IMU))
     reference = swaying(robot, cyclic)
-    reference = replace(reference, cycle_offset=np.array([0.03, 0.01, 0.0]) * cyclic)
+    offset = np.array([0.03, 0.01, 0.0]) * cyclic
+    return written(folder, robot, replace(reference, cycle_offset=offset))
+
+
+def written(folder: Path, robot: Robot, reference: ReferenceMotion) -> Made:
+    """Write a motion and its pack."""
     reference.save(folder / "reference.parquet")
     tracker = tracker_of()
     write_feedback_pack(tracker, folder / "reference.parquet", folder / "pack", robot=robot)
@@ -136,40 +142,39 @@ def test_the_runner_is_short_and_needs_two_packages(made: Made) -> None:
 
 @pytest.mark.slow
 def test_alone_it_survives_as_long_as_in_the_evaluation(
-    made: Made, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
+    robot = stock()
+    made = written(tmp_path, robot, make_reference(robot, sway_angles))
     packages = bare_packages(tmp_path_factory.mktemp("two"), ("numpy", "mujoco"))
     code = """
-import importlib.util, runpy
+import importlib.util
 import numpy as np
 assert importlib.util.find_spec("robojackson") is None
 assert importlib.util.find_spec("onnxruntime") is None
 sys.path.insert(0, sys.argv[1])
 import run
 runner = run.Runner()
-robot = runner.robot
-found = []
-for row in range(0, 40, 8):
-    qpos, qvel = (runner.rows[name][row] for name in ("qpos", "qvel"))
-    robot.data.qpos[:], robot.data.qvel[:] = qpos, qvel
+robot, found = runner.robot, []
+for row in range(0, 80, 10):
+    robot.data.qpos[:], robot.data.qvel[:] = (runner.rows[key][row] for key in ("qpos", "qvel"))
     robot.before = robot.speed()
     runner.begin(row)
     steps = 0
-    while steps < 200 and not runner.step() and runner.tilt < 0.5:
+    while steps < 200 and robot.data.qpos[2] > 0.7 and not runner.step():
         steps += 1
-    found.append(steps)
-print(*found)
+    found.append(steps * runner.dt)
+print(np.mean(found))
 print(run.main(0.15, 0.3, False, run.Runner))
 """
     result = run_bare(packages, code, str(made.folder), cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    steps, said = result.stdout.splitlines()
-    assert said.startswith("danced 0.1")
-    config = EvaluateConfig(phases=5, resets=1, seconds=3.0, threads=1)
-    summary = evaluate_policy(made.tracker, made.reference, made.robot, config).summary
-    if made.reference.cyclic:
-        alone = np.minimum(np.array(steps.split(), int), 200).mean() * 0.015
-        assert alone > 0.5 * float(str(summary["survived_s"]))
+    survived, said = result.stdout.splitlines()
+    assert said.startswith("danced 0.15 s")
+    config = EvaluateConfig(phases=8, resets=1, seconds=3.0, threads=1)
+    summary = evaluate_policy(made.tracker, made.reference, robot, config).summary
+    assert float(survived) > 1
+    assert abs(float(survived) / float(str(summary["survived_s"])) - 1) < 0.3
 
 
 def test_the_accelerometer_feels_what_ours_feels(made: Made) -> None:
