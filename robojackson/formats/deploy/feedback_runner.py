@@ -14,6 +14,7 @@ import numpy as np
 
 from robojackson.formats.deploy.runner import PARSER, SimulatedRobot, main
 from robojackson.formats.deploy.runner import Runner as NetworkRunner
+from robojackson.formats.deploy.state_estimator import StateEstimator, matrix
 
 Array = np.ndarray
 
@@ -48,8 +49,9 @@ class Runner(NetworkRunner):
         pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
         self.cfg = cfg = {key: json.loads(value) for key, _, value in pairs}
         self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
-        self.pose, self.robot = mujoco.MjData(self.model), robot or ImuRobot(self.model, cfg)
-        self.robot.imu, self.rule, self.dt = np.array(cfg["imu"]), cfg["odometry"], cfg["step_dt"]
+        machine = robot or ImuRobot(self.model, cfg)
+        machine.imu, self.force = np.array(cfg["imu"]), machine.force
+        self.pose, self.robot = mujoco.MjData(self.model), machine
         keys = ("default_joint_pos", "stiffness", "damping")
         self.default, self.kp, self.kd = (np.array(cfg[key]) for key in keys)
         if self.robot.joints != cfg["joint_names"]:
@@ -64,7 +66,7 @@ class Runner(NetworkRunner):
     def begin(self, row: int) -> None:
         """Start at a row of the motion, which is turned to where the robot faces."""
         super().begin(row)
-        self.place, self.swing = np.zeros(3), None
+        self.state = StateEstimator(self.model, self.cfg)
 
     def at(self, step: int) -> dict[str, Array]:
         """Return the motion and its feedback at a step; one that repeats travels on."""
@@ -77,71 +79,28 @@ class Runner(NetworkRunner):
 
     def step(self) -> str:
         """Run one control step towards the next row; return the reason for a stop, else nothing."""
-        now, ahead, measured = self.at(self.row), self.at(self.row + 1), self.robot.read()
-        self.row, limit, apart = self.row + 1, self.cfg["feedback_limit"], np.zeros(self.model.nv)
-        qpos, qvel = self.estimate(ahead, *measured)
+        now, ahead = self.at(self.row), self.at(self.row + 1)
+        quat, gyro, angle, rate = self.robot.read()
+        turned, apart, limit = np.zeros(4), np.zeros(self.model.nv), self.cfg["feedback_limit"]
+        mujoco.mju_mulQuat(turned, self.turn * [1, -1, -1, -1], quat)
+        upright = (matrix(turned).T @ matrix(ahead["qpos"][3:7]))[2, 2]
+        self.row, self.tilt = self.row + 1, float(np.arccos(np.clip(upright, -1, 1)))
+        qpos, qvel = np.array([0, 0, 0, *turned, *angle]), np.array([0, 0, 0, *gyro, *rate])
+        qpos, qvel = self.state.estimate(ahead, qpos, qvel, self.force())
         mujoco.mj_differentiatePos(self.model, apart, 1.0, now["path_qpos"], qpos)
-        feet, _, shares = self.points("feet", qpos, qvel, self.rule["foot_low"])
+        feet, _, shares = self.state.points("feet", qpos, qvel, self.cfg["odometry"]["foot_low"])
         apart[:2] -= shares @ (feet - now["places"])[:, :2]
         moved = now["gain"] @ [*apart, *(qvel - now["path_qvel"])] + now["offset"]
         target = ahead["targets"] - np.clip(moved, np.negative(limit), limit)
-        fast = np.abs(measured[3]) > 2 * np.array(self.cfg["limits"]["speed"])
+        return self.drive_or_stop(target, rate)
+
+    def drive_or_stop(self, target: Array, rate: Array) -> str:
+        """Drive the robot, unless it is lost; return the reason for a stop, else nothing."""
+        fast = np.abs(rate) > 2 * np.array(self.cfg["limits"]["speed"])
         if self.tilt > self.cfg["stop_tilt"] or fast.any() or not np.isfinite(target).all():
             return f"leans {self.tilt:.2f} rad from the motion, {fast.sum()} joints too fast"
         self.robot.drive(target, self.kp, self.kd)
         return ""
-
-    def estimate(self, ahead: dict[str, Array], *measured: Array) -> tuple[Array, Array]:
-        """Return position and velocity, with estimates of the root's."""
-        rule, dt, turned, (quat, gyro, angle, rate) = self.rule, self.dt, np.zeros(4), measured
-        mujoco.mju_mulQuat(turned, self.turn * [1, -1, -1, -1], quat)
-        axes = matrix(turned)
-        swing = axes @ np.cross(gyro, self.cfg["imu"])
-        upright = (axes.T @ matrix(ahead["qpos"][3:7]))[2, 2]
-        self.tilt = float(np.arccos(np.clip(upright, -1, 1)))
-        qpos, qvel = np.array([0, 0, 0, *turned, *angle]), np.array([0, 0, 0, *gyro, *rate])
-        aimed, sliding, _ = self.points("soles", ahead["qpos"], ahead["qvel"], rule["low"])
-        sliding = np.where(aimed[:, 2:] < rule["near"], sliding, 0.0) * [1, 1, 0]
-        soles, speeds, shares = self.points("soles", qpos, qvel, rule["low"])
-        speed, felt, share = shares @ (sliding - speeds), ahead["qvel"][:3], 1.0
-        if self.swing is None:
-            self.place = ahead["qpos"][:3] - dt * felt
-        else:
-            felt = self.swing + dt * (axes @ self.robot.force() + self.model.opt.gravity) - swing
-            share = rule["share"]
-        velocity = corrected(felt, speed, share, rule["doubt_speed"])
-        self.place = self.place + (0.0 if self.swing is None else dt) * velocity
-        high = corrected(self.place[2:], -soles[:, 2].min(), rule["share"], rule["doubt_height"])
-        self.place[2:], self.swing = high, velocity + swing
-        qpos[:3], qvel[:3] = self.place, velocity
-        return qpos, qvel
-
-    def points(self, name: str, qpos: Array, qvel: Array, low: float) -> tuple[Array, Array, Array]:
-        """Return the lowest points of balls, their speeds, and how much each of them carries."""
-        self.pose.qpos[:], jacobian, found = qpos, np.zeros((3, self.model.nv)), []
-        mujoco.mj_kinematics(self.model, self.pose)
-        mujoco.mj_comPos(self.model, self.pose)
-        for owner, place, radius in self.cfg[name]:
-            body = self.pose.body(owner)
-            centre = body.xpos + body.xmat.reshape(3, 3) @ place
-            mujoco.mj_jac(self.model, self.pose, jacobian, None, centre, body.id)
-            found.append((centre - [0, 0, radius], jacobian @ qvel))
-        points, speeds = np.array(found).swapaxes(0, 1)
-        shares = np.exp(-(points[:, 2] - points[:, 2].min()) / low)
-        return points, speeds, shares / shares.sum()
-
-
-def matrix(quat: Array) -> Array:
-    """Return the rotation matrix."""
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, quat)
-    return np.asarray(turn.reshape(3, 3))
-
-
-def corrected(value: Array, measured: Array, share: float, doubt: float) -> Array:
-    """Return a value moved to a measured one, by half of the share where that is `doubt` away."""
-    apart = measured - value
-    return np.asarray(value + share / (1 + (np.linalg.norm(apart) / doubt) ** 2) * apart)
 
 
 if __name__ == "__main__":

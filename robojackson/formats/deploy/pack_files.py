@@ -25,9 +25,17 @@ from robojackson.robot.model import Robot
 from robojackson.robot.sampling import sampled
 
 RUNNER = Path(__file__).with_name("runner.py")
-FEEDBACK_RUNNER = Path(__file__).with_name("feedback_runner.py")
-RUNNER_OF_NETWORKS = "network_runner"
-"""Module of the runner of networks in a pack without one."""
+PARTS = {
+    "run.py": Path(__file__).with_name("feedback_runner.py"),
+    "network_runner.py": RUNNER,
+    "state_estimator.py": Path(__file__).with_name("state_estimator.py"),
+}
+"""Modules of a pack without a network."""
+MODULES = {
+    "robojackson.formats.deploy.runner": "network_runner",
+    "robojackson.formats.deploy.state_estimator": "state_estimator",
+}
+"""Names of their imports here and in a pack."""
 
 
 def pack_files(
@@ -80,15 +88,21 @@ def feedback_files(
     `pack_files`."""
     require_same_joints(feedback.machine.reference, robot.model)
     rows = feedback.archive()
-    runner = FEEDBACK_RUNNER.read_text(encoding="utf-8")
     own = {
+        **{name: _alone(path) for name, path in PARTS.items()},
         "feedback.npz": rows,
         "deploy.yaml": feedback_yaml(feedback, hashlib.sha256(rows).hexdigest()),
-        "run.py": runner.replace("robojackson.formats.deploy.runner", RUNNER_OF_NETWORKS).encode(),
-        f"{RUNNER_OF_NETWORKS}.py": RUNNER.read_bytes(),
         "README.md": feedback_readme(feedback, evaluation),
     }
     return own | _common(robot, ingredients, evaluation)
+
+
+def _alone(module: Path) -> bytes:
+    """Return a module whose imports are from the pack."""
+    text = module.read_text(encoding="utf-8")
+    for here, there in MODULES.items():
+        text = text.replace(here, there)
+    return text.encode()
 
 
 def _common(

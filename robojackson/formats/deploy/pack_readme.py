@@ -26,7 +26,8 @@ FEEDBACK_FILES = """\
 | file | what |
 |---|---|
 | `run.py` | runs it: `pip install numpy mujoco`, `python run.py --view` |
-| `network_runner.py` | the part of it that packs with a network share: robot, start, stop |
+| `state_estimator.py` | what it knows of itself from what it measures |
+| `network_runner.py` | the part that packs with a network share: robot, start, stop |
 | `feedback.npz` | targets, gains and the path that they keep the robot on, a row a control step |
 | `deploy.yaml` | joint order, gains, limits, soles, accelerometer, odometry; Unitree's keys first |
 """
