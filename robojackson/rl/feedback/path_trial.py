@@ -24,6 +24,9 @@ NOISE = (0.02, 0.1, 0.02)
 """Standard deviations of these starts from the motion: hinges, rad; their speeds, rad/s; the root's
 velocities, m/s and rad/s. Without noise a path that only exact states follow seems as good as one
 that bears errors."""
+AS_MANY, POOR = 0.042, 0.5
+"""Share of the starts (two of them) that two regulators may differ by for no other reason than the
+noise of the starts; share below which a regulator holds little."""
 LARGEST_MOVE = 6.0
 """Full actions that the feedback moves a target at most: a path is up to four off the motion."""
 
@@ -41,6 +44,15 @@ class Held(NamedTuple):
     strictly: float
     to_end: float
     of_the_time: float
+
+    def beats(self, other: "Held") -> bool:
+        """Return whether it holds more. Where neither holds half of the starts strictly and they
+        differ by two at most, those that come to the end decide."""
+        if max(self.strictly, other.strictly) < POOR:
+            for mine, theirs in zip(self[:2], other[:2], strict=True):
+                if abs(mine - theirs) > AS_MANY:
+                    return mine > theirs
+        return self > other
 
 
 class Trial:

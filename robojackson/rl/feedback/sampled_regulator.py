@@ -10,7 +10,7 @@ from robojackson.rl.feedback.keypoint_rule import KeypointRule
 from robojackson.rl.feedback.nominal_path import Gains, Linear, Path, Progress, no_progress
 from robojackson.rl.feedback.path_refinement import ROUNDS, refinements
 from robojackson.rl.feedback.path_search import RULE_SHARE, PathSearch
-from robojackson.rl.feedback.path_trial import Trial
+from robojackson.rl.feedback.path_trial import AS_MANY, POOR, Trial
 from robojackson.rl.feedback.regulator import (
     following,
     linearised,
@@ -33,9 +33,9 @@ and begins earlier."""
 TRIES, TRIED_S, ENOUGH = 6, 45.0, 0.9
 """Searches from the beginning, of which the best is taken: at most so many, and of so long a motion
 in all; and none after one that holds so great a share of its starts."""
-AS_MANY = 0.042
-"""Share of the starts (two of them) by which a path nearer to the motion may hold fewer than the
-best: less than the chance of the starts' noise; where the best holds enough, it has to."""
+POOR_TRIES = 4
+"""So many at least, however long the motion is, while little is held: what a single search of a
+long motion finds is decided by the last digits of sums, which processors round differently."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -74,17 +74,19 @@ def sampled_regulator(
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     chosen = None
-    for number in range(tries):
+    for number in range(max(tries, min(POOR_TRIES, most_tries or TRIES))):
+        if number >= tries and held.strictly >= POOR:
+            break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along, ended = _searched(search, sim, reference, linear, action, clip.dt, progress)
         found = _gains(sim, clip, action, feet, path, along, reference)
         now = trial.held(found)
-        if now > held:
+        if now.beats(held):
             best, held, chosen = found, now, (path, along) if ended else None
         if held.strictly >= ENOUGH:
             break
-    most = held.strictly
+    most, ends = held.strictly, held.to_end
     for number, (path, along) in enumerate(
         refinements(sim, *chosen, reference, action, most_rounds) if chosen else ()
     ):
@@ -92,7 +94,7 @@ def sampled_regulator(
         found = _gains(sim, clip, action, feet, path, along, reference)
         now = trial.held(found)
         least = most - AS_MANY if most < ENOUGH else max(ENOUGH, most - AS_MANY)
-        if now.strictly >= least:
+        if now.strictly >= least and (most >= POOR or now.to_end >= ends - AS_MANY):
             best, held, most = found, now, max(most, now.strictly)
     return replace(best, held=np.array([held.strictly]))
 
@@ -179,6 +181,8 @@ def settings() -> list[float]:
         AS_MANY,
         TRIES,
         TRIED_S,
+        POOR,
+        POOR_TRIES,
         LOW_M,
         *path_search.settings(),
         *path_refinement.settings(),

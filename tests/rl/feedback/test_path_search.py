@@ -156,6 +156,30 @@ def test_no_search_follows_one_that_holds_nearly_all(
     assert next(held) == 1.0, "a search more than needed"
 
 
+@pytest.mark.parametrize(
+    ("shares", "searches"), [((0.1, 0.2, 0.3, 0.4, 0.45), 4), ((0.1, 0.6), 2), ((0.6,), 1)]
+)
+def test_a_long_motion_is_searched_again_only_while_little_is_held(
+    found: Callable[[], Gains],
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+    shares: tuple[float, ...],
+    searches: int,
+) -> None:
+    held, done = iter([0.0, *shares]), list[int]()
+
+    def searched(*given: object) -> tuple[Path, Linear, bool]:
+        done.append(1)
+        return (*plain[1:], False)
+
+    monkeypatch.setattr(sampled_regulator, "TRIED_S", 0.0)
+    monkeypatch.setattr(sampled_regulator, "_searched", searched)
+    monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
+    monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
+    assert found().held == max(shares[:searches])
+    assert len(done) == searches
+
+
 def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
     found: Callable[[], Gains],
     plain: tuple[Gains, Path, Linear],
@@ -176,6 +200,22 @@ def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
         monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, names=names: next(names))
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: Held(next(held), 1.0, 1.0))
         assert found() == taken
+
+
+def test_a_path_nearer_to_the_motion_that_brings_none_to_the_end_is_not_taken(
+    found: Callable[[], Gains],
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names = iter(["searched", "nearer"])
+    held = iter([Held(0.0, 0.0, 0.1), Held(0.0, 0.94, 0.95), Held(0.02, 0.02, 0.3)])
+    monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], True))
+    monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: [plain[1:]])
+    monkeypatch.setattr(sampled_regulator, "TRIES", 1)
+    monkeypatch.setattr(sampled_regulator, "replace", lambda best, held: best)
+    monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: next(names))
+    monkeypatch.setattr(Trial, "held", lambda *given: next(held))
+    assert found() == "searched"
 
 
 class Falls:

@@ -9,7 +9,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.feedback.keypoint_rule import KeypointRule
-from robojackson.rl.feedback.path_trial import Trial
+from robojackson.rl.feedback.path_trial import Held, Trial
 from robojackson.rl.feedback.regulator import regulator
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.motors import residual_scale
@@ -62,3 +62,20 @@ def test_robots_that_break_the_rule_come_to_the_end_and_do_not_count(
     assert found[0].strictly == found[0].to_end > 0
     assert found[1].strictly == 0.0
     assert found[1][1:] == found[0][1:]
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs", "wins"),
+    [
+        (Held(0.0, 0.94, 0.95), Held(0.02, 0.02, 0.46), True),  # both hold little strictly
+        (Held(0.02, 0.02, 0.46), Held(0.0, 0.94, 0.95), False),
+        (Held(0.2, 0.2, 0.5), Held(0.1, 0.94, 0.9), True),  # five starts more by the strict rule
+        (Held(0.6, 0.6, 0.7), Held(0.58, 0.94, 0.95), True),  # half is held: strictly first
+        (Held(0.1, 0.3, 0.6), Held(0.1, 0.3, 0.5), True),
+        (Held(0.1, 0.3, 0.5), Held(0.1, 0.3, 0.5), False),
+    ],
+)
+def test_where_little_is_held_by_the_rule_those_that_come_to_the_end_decide(
+    mine: Held, theirs: Held, wins: bool
+) -> None:
+    assert mine.beats(theirs) == wins
