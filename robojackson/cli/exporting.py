@@ -124,7 +124,7 @@ def _open_points(made: Mapping[str, Any]) -> list[str]:
         found.append("no sim-to-sim passport (evaluate --passport)")
     elif weakest < LEAST_STRICT:
         row = f"{made['weakest_case']}, strict success {100 * weakest:.0f} %"
-        found.append(f"the passport's weakest row: {row} (train --robust)")
+        found.append(f"the passport's weakest row: {row} (train --robust holds more)")
     if made["unknown_licences"]:
         found.append(f"licences unknown: {', '.join(made['unknown_licences'])} (--licence)")
     return found

@@ -67,7 +67,21 @@ def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
         "odometry": feedback.odometry,
         "feedback": sha256,
     }
-    return _text(_of_machine(feedback.machine) | ours)
+    machine = _of_machine(feedback.machine)
+    machine["limits"] |= _reach(feedback)
+    return _text(machine | ours)
+
+
+def _reach(feedback: DeployedFeedback) -> dict[str, list[float]]:
+    """Return the limits of the targets: the joints' ranges, and beyond them what the feedback may
+    ask for. A target beyond a joint's end is a torque there, whose limit holds; without it a robot
+    with bent knees or ankles cannot be caught."""
+    own, most = limits(feedback.machine), feedback.limit
+    lowest, highest = feedback.targets.min(0) - most, feedback.targets.max(0) + most
+    return {
+        "lower": _numbers(np.minimum(own["lower"], lowest)),
+        "upper": _numbers(np.maximum(own["upper"], highest)),
+    }
 
 
 def _text(settings: Settings) -> bytes:

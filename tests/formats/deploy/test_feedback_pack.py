@@ -123,11 +123,21 @@ def largest_difference(made: Made, turn: float = 0.0) -> float:
             if reason:
                 break
             found.append(np.abs(command[0, motor] - replayed.target).max())
+            held = np.clip(replayed.target, runner.cfg["limits"]["lower"],
+                           runner.cfg["limits"]["upper"])  # fmt: skip
+            np.testing.assert_array_equal(held, replayed.target)
             sim.step(command)
     assert len(found) > 10
     moved = runner.rows["targets"][(45 + len(found)) % len(made.reference)] - replayed.target
     assert np.abs(moved).max() > 1e-3, "the feedback moves something"
     return float(max(found))
+
+
+def test_targets_may_press_a_joint_on_its_end_and_ranges_are_never_narrower(made: Made) -> None:
+    limits, (low, high) = Runner(made.folder).cfg["limits"], made.robot.model.jnt_range[1:].T
+    assert (np.array(limits["lower"]) <= low).all()
+    assert (np.array(limits["upper"]) >= high).all()
+    assert (np.array(limits["upper"]) > high).any()
 
 
 def test_targets_are_those_of_the_tracker(made: Made) -> None:
