@@ -17,6 +17,7 @@ from robojackson.formats.deploy.runner import Runner as NetworkRunner
 from robojackson.formats.deploy.state_estimator import StateEstimator, matrix
 
 Array = np.ndarray
+PARSER.description = __doc__
 
 
 class ImuRobot(SimulatedRobot):

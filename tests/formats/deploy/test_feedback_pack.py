@@ -3,6 +3,8 @@
 import hashlib
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -149,6 +151,12 @@ def test_the_runner_is_short_and_needs_two_packages(made: Made) -> None:
         text = (made.folder / name).read_text()
         assert len(text.splitlines()) <= 150
         assert "robojackson." not in text
+    result = subprocess.run(
+        [sys.executable, "run.py", "--help"], cwd=made.folder, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert "numpy and mujoco alone" in result.stdout
+    assert "onnx" not in result.stdout
 
 
 @pytest.mark.slow
