@@ -16,14 +16,15 @@ from robojackson.formats.deploy.deployed_feedback import Ball, DeployedFeedback
 from robojackson.formats.deploy.licence_passport import Ingredient, with_declared
 from robojackson.formats.deploy.pack_files import feedback_files
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.tracker_descriptions import describe_tracker
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers import leg_odometry
-from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker import Tracker
+from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import tree
 
@@ -71,33 +72,53 @@ def write_feedback_pack(
         BadConfiguration: a robot or a licence that cannot go into a pack, or another tracker's
             evaluation.
     """
+    described = describe_tracker(tracker) if isinstance(tracker, str) else tracker.description
+    _require_onboard(described)
     who = load_tracker(tracker) if isinstance(tracker, str) else tracker
-    name = who.description.name
     source = Path(reference)
     motion = ReferenceMotion.load(source)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     machine = who.equip(machine)
-    if not isinstance(who, RegulatorTracker) or who.description.root_state != "estimated":
-        raise BadPolicy(
-            f"tracker {name!r} cannot go into a deploy pack: that takes a tracker of the network"
-            " `regulator` with `root_state: estimated`, such as regulator_onboard, or a policy that"
-            " was trained with --set track.observation=onboard"
-        )
-    evaluated = evaluation_in(source.parent, evaluation)
-    if evaluated is not None and evaluated.get("tracker") != name:
-        if evaluation is not None:
-            raise BadConfiguration(
-                f"{evaluation} is not an evaluation of {name!r}: make one with `robojackson "
-                f"evaluate {name} {source} --passport -o DIR`"
-            )
-        evaluated = None
-    parts = deployed_feedback(who.control, motion, machine, progress)
+    evaluated = _evaluation_of(described.name, source, evaluation)
     note = "computed from the robot's model and the motion"
-    law = Ingredient("tracker", f"the feedback, {name}", "own", note)
+    law = Ingredient("tracker", f"the feedback, {described.name}", "own", note)
     ingredients = with_declared([law, *motion_ingredients(source, machine)], licences or {})
+    parts = deployed_feedback(who.control, motion, machine, progress)
     files = feedback_files(parts, machine, ingredients, evaluated)
     written = write_pack(Path(folder), files, ingredients, evaluated)
     return {"robot": motion.robot, **written}
+
+
+def _require_onboard(tracker: TrackerDescription) -> None:
+    """Refuse what a real robot cannot run.
+
+    Raises:
+        BadPolicy: a network, or feedback of the exact state.
+    """
+    if tracker.network != "regulator" or tracker.root_state != "estimated":
+        raise BadPolicy(
+            f"tracker {tracker.name!r} cannot go into a deploy pack: that takes a tracker of the "
+            "network `regulator` with `root_state: estimated`, such as regulator_onboard, or a "
+            "policy that was trained with --set track.observation=onboard"
+        )
+
+
+def _evaluation_of(tracker: str, motion: Path, given: FilePath | None) -> Facts | None:
+    """Return the evaluation of a tracker that is given or lies beside the motion; None where
+    neither is of this tracker.
+
+    Raises:
+        StoreError, BadConfiguration: the given file is missing or another tracker's.
+    """
+    found = evaluation_in(motion.parent, given)
+    if found is None or found.get("tracker") == tracker:
+        return found
+    if given is None:
+        return None
+    raise BadConfiguration(
+        f"{given} is not an evaluation of {tracker!r}: make one with `robojackson evaluate "
+        f"{tracker} {motion} --passport -o DIR`"
+    )
 
 
 def deployed_feedback(

@@ -64,6 +64,8 @@ def export(
     if pack is not None and pack != PackInputs():
         raise BadConfiguration("--reference, --evaluation and --licence are for --to deploy")
     require_another(source, out)
+    if is_tracker(source):
+        raise BadConfiguration(f"tracker {str(source)!r} can be written as {DEPLOY} alone")
     require_file(source)
     about: dict[str, Any]
     if source.suffix == POLICY_SUFFIX:

@@ -150,6 +150,10 @@ def test_a_pack_of_a_tracker_needs_the_motion_and_one_that_a_robot_can_run(
     other = robojackson(*words, "--reference", str(reference))
     assert other.code != 0
     assert "drives robot 'g1', not 'humanoid'" in other.err
+    network = robojackson("export", "twist2", *words[2:], "--reference", str(reference))
+    assert "'twist2' cannot go into a deploy pack" in network.err
+    onnx = robojackson("export", "regulator_onboard", "--to", "onnx", "-o", str(tmp_path / "x"))
+    assert "can be written as deploy alone" in onnx.err
     assert not (tmp_path / "pack").exists()
 
 

@@ -286,6 +286,17 @@ def test_what_needs_more_than_a_robot_measures_is_refused(made: Made, tmp_path: 
     assert not (tmp_path / "pack").exists()
 
 
+def test_a_licence_of_no_kind_is_refused_before_the_feedback_is_computed(
+    made: Made, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robojackson.api.feedback_pack.deployed_feedback", pytest.fail)
+    path = made.folder.parent / "reference.parquet"
+    with pytest.raises(BadConfiguration, match="film=MIT: kinds are"):
+        write_feedback_pack(
+            made.tracker, path, tmp_path, robot=made.robot, licences={"film": "MIT"}
+        )
+
+
 def test_an_evaluation_of_another_tracker_is_refused_and_one_beside_it_is_left_out(
     made: Made, tmp_path: Path, write_evaluation: Callable[[Path, str], Path]
 ) -> None:
