@@ -94,8 +94,8 @@ def test_a_missed_bar_is_marked_beside_its_figure() -> None:
     rows = json.loads((HERE.results / "learning.json").read_text())["rows"]
     apt1 = [row for row in rows if row["move"] == "g1_authors_apt1_onboard"]
     line = g1_rows_table(apt1).splitlines()[-1]
-    assert "| 2.00 ✗ | 0.80, " in line
-    assert line.count("✗") == 1
+    assert "| 1.90 ✗ | 0.80 ✗, " in line
+    assert line.count("✗") == 2
 
 
 def test_only_what_lies_between_the_comments_is_replaced() -> None:
