@@ -9,7 +9,6 @@ import numpy as np
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
 from robojackson.api.pack_parts import (
     REFERENCE,
-    Facts,
     beside,
     evaluation_in,
     machine_of,
@@ -25,6 +24,7 @@ from robojackson.formats.deploy.deployed_policy import (
 )
 from robojackson.formats.deploy.licence_passport import with_declared
 from robojackson.formats.deploy.pack_files import pack_files
+from robojackson.formats.deploy.pack_readme import Figures
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.controllers import control_of
@@ -47,7 +47,7 @@ def write_deploy_pack(
     robot: RobotLike | None = None,
     evaluation: FilePath | None = None,
     licences: Mapping[str, str] | None = None,
-) -> Facts:
+) -> Figures:
     """Write a policy that sees what a robot measures by itself, as a pack that runs alone.
 
     Args:

@@ -1,13 +1,13 @@
 """Write a deploy pack without a network: the feedback along a motion, from measurements alone."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
-from robojackson.api.pack_parts import Facts, evaluation_in, machine_of, motor_of_hinge, write_pack
+from robojackson.api.pack_parts import evaluation_in, machine_of, motor_of_hinge, write_pack
 from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.api.robots import load_robot
 from robojackson.api.trackers import load_tracker
@@ -15,10 +15,12 @@ from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.formats.deploy.deployed_feedback import Ball, DeployedFeedback
 from robojackson.formats.deploy.licence_passport import Ingredient, with_declared
 from robojackson.formats.deploy.pack_files import feedback_files
+from robojackson.formats.deploy.pack_readme import Figures
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.tracker_descriptions import describe_tracker
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.feedback.cached_feedback import feedback_of
+from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors
@@ -28,7 +30,6 @@ from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import tree
 
-Progress = Callable[[str, int, int], None]
 ODOMETRY = {
     "low": leg_odometry.LOW_M,
     "near": leg_odometry.NEAR_M,
@@ -47,8 +48,8 @@ def write_feedback_pack(
     robot: RobotLike | None = None,
     evaluation: FilePath | None = None,
     licences: Mapping[str, str] | None = None,
-    progress: Progress = lambda name, step, total: None,
-) -> Facts:
+    progress: Progress = no_progress,
+) -> Figures:
     """Write a tracker that is feedback from a robot's own measurements, as a pack that runs alone.
 
     Args:
@@ -103,7 +104,7 @@ def _require_onboard(tracker: TrackerDescription) -> None:
         )
 
 
-def _evaluation_of(tracker: str, motion: Path, given: FilePath | None) -> Facts | None:
+def _evaluation_of(tracker: str, motion: Path, given: FilePath | None) -> Figures | None:
     """Return the evaluation of a tracker that is given or lies beside the motion; None where
     neither is of this tracker.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Int
@@ -13,14 +12,13 @@ from robojackson.files.file_tree import results_in
 from robojackson.files.foreign_file import read_json
 from robojackson.formats.deploy.deployed_machine import DeployedMachine, places_in_mjcf
 from robojackson.formats.deploy.licence_passport import Ingredient, together
+from robojackson.formats.deploy.pack_readme import Figures
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors, gains
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
-Facts = Mapping[str, Any]
-"""Figures of an evaluation, or what was written."""
 REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
 
 
@@ -77,7 +75,7 @@ def beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path
     return path
 
 
-def evaluation_in(folder: Path, given: FilePath | None) -> Facts | None:
+def evaluation_in(folder: Path, given: FilePath | None) -> Figures | None:
     """Return the figures of an evaluation; None where none is given and none is in the folder.
 
     Raises:
@@ -97,8 +95,8 @@ def write_pack(
     folder: Path,
     files: Mapping[str, bytes],
     ingredients: list[Ingredient],
-    evaluation: Facts | None,
-) -> Facts:
+    evaluation: Figures | None,
+) -> Figures:
     """Write the files of a pack; return what was written, its passport and its licences.
 
     Raises:
@@ -119,6 +117,6 @@ def write_pack(
     }
 
 
-def _strict_of(row: Facts) -> float:
+def _strict_of(row: Figures) -> float:
     """Return strict success of a row of the passport."""
     return float(row["strict_success"])

@@ -59,12 +59,13 @@ def export(
     from robojackson.api.motions import read_motion, require_another, write_motion
 
     began = time.monotonic()
-    if to == DEPLOY and (source.suffix == POLICY_SUFFIX or is_tracker(source)):
+    tracker = is_tracker(source)
+    if to == DEPLOY and (source.suffix == POLICY_SUFFIX or tracker):
         return _deploy(source, out, robot, pack or PackInputs(), began)
     if pack is not None and pack != PackInputs():
         raise BadConfiguration("--reference, --evaluation and --licence are for --to deploy")
     require_another(source, out)
-    if is_tracker(source):
+    if tracker:
         raise BadConfiguration(f"tracker {str(source)!r} can be written as {DEPLOY} alone")
     require_file(source)
     about: dict[str, Any]
@@ -94,7 +95,7 @@ def _deploy(
     from robojackson.api.feedback_pack import write_feedback_pack
 
     said: dict[str, Any] = {"evaluation": pack.evaluation, "licences": pack.licences}
-    if is_tracker(source):
+    if source.suffix != POLICY_SUFFIX:
         if pack.reference is None:
             raise BadConfiguration(
                 f"a pack of tracker {str(source)!r} needs the motion: --reference reference.parquet"

@@ -207,9 +207,11 @@ def evaluate(
 
 def is_tracker(policy: Path) -> bool:
     """Return whether a policy is the name of a tracker; a file of that name takes precedence."""
+    if policy.is_file():
+        return False
     from robojackson.pipeline.tracker_descriptions import tracker_names
 
-    return str(policy) in tracker_names() and not policy.is_file()
+    return str(policy) in tracker_names()
 
 
 VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")

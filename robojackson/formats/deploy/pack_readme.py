@@ -60,9 +60,9 @@ Nothing here has been on a real robot. All figures above are of simulations.
 2. Hang the robot from a gantry with slack for the dance, feet just off the floor, 3 m free around
    it, no person within reach, and a second person at the emergency stop of the robot itself.
 3. `Runner(robot=...)` drives any object with `joints` (names, in order), `read()` (attitude wxyz,
-   gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`{and}.
-   Your `drive` must keep the limits of `deploy.yaml`, as `SimulatedRobot.drive` does, and return
-   after one control step: a loop that is late is another robot.
+   gyroscope in the root's axes, joint angles and speeds), `drive(target, stiffness, damping)`
+   {also}. Your `drive` must keep the limits of `deploy.yaml`, as `SimulatedRobot.drive` does, and
+   return after one control step: a loop that is late is another robot.
 4. First with the stop in your hand and damping alone (`drive` with stiffness 0), then the soft
    start, then one second of the dance, then more.
 5. It stops by itself when robot and motion lean apart more than `stop_tilt`, when a joint is twice
@@ -88,7 +88,7 @@ def policy_readme(policy: DeployedPolicy, figures: Figures | None) -> bytes:
         f"{policy.observation_size} inputs (layout `{policy.layout_sha256[:12]}`), "
         "target = default_joint_pos + action_scale * action."
     )
-    safety = SAFETY.format(refused=OF_NETWORK, **{"and": ""})
+    safety = SAFETY.format(refused=OF_NETWORK, also="and nothing else")
     own = [_head(policy.machine, tail), FILES.strip() + "\n" + COMMON, _terms(policy)]
     return _text([*own, *_figures(figures), safety])
 
@@ -97,7 +97,7 @@ def feedback_readme(feedback: DeployedFeedback, figures: Figures | None) -> byte
     """Return the content of the file for feedback without a network; arguments of
     `policy_readme`."""
     tail = "linear feedback along the motion, without a network."
-    safety = SAFETY.format(refused=OF_FEEDBACK, **{"and": " and `force()`"})
+    safety = SAFETY.format(refused=OF_FEEDBACK, also="and `force()`")
     files = FEEDBACK_FILES.strip() + "\n" + COMMON
     return _text([_head(feedback.machine, tail), files, ESTIMATE, *_figures(figures), safety])
 

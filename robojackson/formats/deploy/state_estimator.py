@@ -23,7 +23,7 @@ class StateEstimator:
     def __init__(self, model: mujoco.MjModel, cfg: dict[str, Any]) -> None:
         self.model, self.cfg, self.pose = model, cfg, mujoco.MjData(model)
         self.rule, self.dt = cfg["odometry"], cfg["step_dt"]
-        self.swing: Array | None = None
+        self.imu_velocity: Array | None = None
         self.place = np.zeros(3)
 
     def estimate(
@@ -43,15 +43,15 @@ class StateEstimator:
         sliding = np.where(aimed[:, 2:] < rule["near"], sliding, 0.0) * [1, 1, 0]
         soles, speeds, shares = self.points("soles", qpos, qvel, low)
         speed, felt = shares @ (sliding - speeds), ahead["qvel"][:3]
-        if self.swing is None:
+        if self.imu_velocity is None:
             velocity = corrected(felt, speed, 1.0, rule["doubt_speed"])
             self.place = ahead["qpos"][:3] - self.dt * felt
         else:
-            felt = self.swing + self.dt * (axes @ force + self.model.opt.gravity) - swing
+            felt = self.imu_velocity + self.dt * (axes @ force + self.model.opt.gravity) - swing
             velocity = corrected(felt, speed, rule["share"], rule["doubt_speed"])
             self.place = self.place + self.dt * velocity
         high = corrected(self.place[2:], -soles[:, 2].min(), rule["share"], rule["doubt_height"])
-        self.place[2:], self.swing = high, velocity + swing
+        self.place[2:], self.imu_velocity = high, velocity + swing
         qpos[:3], qvel[:3] = self.place, velocity
         return qpos, qvel
 

@@ -33,11 +33,11 @@ DOUBT_M_S, DOUBT_M = 0.05, 0.02
 
 @dataclass(frozen=True)
 class RootState:
-    """Estimates of N roots: place and velocity, and the velocity of the accelerometer beside it."""
+    """Estimates of N roots, and the velocity of the accelerometer beside each."""
 
     place: Float[np.ndarray, "N 3"]
     velocity: Float[np.ndarray, "N 3"]
-    swing: Float[np.ndarray, "N 3"]
+    imu_velocity: Float[np.ndarray, "N 3"]
 
 
 class LegOdometry:
@@ -79,7 +79,7 @@ class LegOdometry:
             if seen.force is None:
                 raise ValueError("leg odometry needs the accelerometer")
             turned = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), seen.force)
-            predicted = self._now.swing + self._dt * (turned + self._gravity) - swing
+            predicted = self._now.imu_velocity + self._dt * (turned + self._gravity) - swing
             velocity = _corrected(predicted, measured, SHARE, DOUBT_M_S)
             place = self._now.place + self._dt * velocity
         place[:, 2:] = _corrected(place[:, 2:], -lowest[:, None], SHARE, DOUBT_M)
