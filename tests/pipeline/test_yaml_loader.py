@@ -187,6 +187,7 @@ def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     [
         ({"tqc.quantiles": 2}, "must leave some of the 2 quantiles"),
         ({"tqc.buffer": 2000}, "room for 1984 transitions .* begin after 2000: raise buffer"),
+        ({"tqc.buffer": 1000, "tqc.n_envs": 200, "tqc.warmup": 9, "tqc.n_steps": 5}, "the 5 trans"),
         ({"mode": "paper", "paper.curiosity": "formula"}, "set curiosity=formula instead"),
         ({"track.reward.curiosity": "formula"}, "set curiosity=formula instead"),
         ({"track.random.integrators": ["RK5"]}, "integrators"),

@@ -20,6 +20,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "warmup": 100,
         "tau": 0.005,
         "gamma": 0.99,
+        "n_steps": 1,
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
@@ -36,6 +37,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "batch": 512,
         "tau": 0.005,
         "gamma": 0.99,
+        "n_steps": 1,
         "policy_delay": 1,
         "target_entropy": 1.0,
         "actor_average": 0.0,
@@ -75,6 +77,8 @@ class TqcConfig:
         batch: Transitions of a gradient update.
         tau: Share by which the target critics follow an update.
         gamma: Discount of a later reward, factor a policy step.
+        n_steps: Rewards that a critic's target adds up before it bootstraps (n-step returns;
+            Sutton, 1988), policy steps.
         critics: Critic networks; SBX has two, and so has the reference.
         quantiles: Quantiles of each critic.
         top_quantiles_to_drop: Quantiles of each critic that are dropped, against overestimation.
@@ -105,6 +109,7 @@ class TqcConfig:
     batch: int = Field(default=256, ge=1, le=65_536)
     tau: float = Field(default=0.01, gt=0, le=1)
     gamma: float = Field(default=0.985, gt=0, lt=1)
+    n_steps: int = Field(default=3, ge=1, le=100)
     policy_delay: int = Field(default=2, ge=1)
     critics: Literal[2] = 2
     quantiles: int = Field(default=25, ge=1, le=1_000)
@@ -136,7 +141,17 @@ class TqcConfig:
                 "top_quantiles_to_drop",
                 "quantiles",
             )
-        room = max(self.buffer // self.n_envs, 1) * self.n_envs
+        rows = max(self.buffer // self.n_envs, 1)
+        if self.n_steps >= rows:
+            raise ConflictingValues(
+                f"n_steps, {self.n_steps}, needs more than the {rows} transitions of a simulation "
+                f"for which the replay buffer has room ({self.buffer} on {self.n_envs} "
+                "simulations): raise buffer or lower n_steps",
+                "n_steps",
+                "buffer",
+                "n_envs",
+            )
+        room = rows * self.n_envs
         if self.warmup > room:
             raise ConflictingValues(
                 f"the replay buffer has room for {room} transitions ({self.buffer} on "

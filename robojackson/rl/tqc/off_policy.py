@@ -27,6 +27,7 @@ def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
         "batch_size": config.batch,
         "tau": config.tau,
         "gamma": config.gamma,
+        "n_steps": config.n_steps,
         "train_freq": config.steps_per_round,
         "gradient_steps": config.updates_per_round,
         "ent_coef": config.entropy,

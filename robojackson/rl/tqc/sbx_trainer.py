@@ -73,13 +73,16 @@ class OverlappedTQC(TQC):
             return
         self._acting = dense_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
+        discounts = np.full(batch_size * gradient_steps, self.gamma, np.float32)
+        if samples.discounts is not None:  # of returns over several steps
+            discounts = samples.discounts.numpy().flatten()
         data = ReplayBufferSamplesNp(
             samples.observations.numpy(),
             samples.actions.numpy(),
             samples.next_observations.numpy(),
             samples.dones.numpy().flatten(),
             samples.rewards.numpy().flatten(),
-            np.full(batch_size * gradient_steps, self.gamma, np.float32),
+            discounts,
         )
         policy = self.policy
         learnt = round_of_updates(
