@@ -35,9 +35,6 @@ the others along a sampled path (`docs/learning_g1.md`, "Linear feedback")."""
 NOTES = {
     "g1_dance_b": "the feedback alone with each seed, which was kept at the training's end",
     "g1_walk": "seed 100 on the feedback along the reference, the others on a sampled path",
-    "g1_authors_walk": "the feedback alone, which was kept at the training's end",
-    "g1_cmu_05_09": "the feedback alone, which was kept at the training's end",
-    "g1_cmu_05_18": "the feedback alone, which was kept at the training's end",
 }
 """What differs in trained rows from other rows, or among their seeds."""
 OF_NOTEBOOK = "its row was replaced by the one with feedback (docs/learning_g1.md#linear-feedback)"
