@@ -9,6 +9,9 @@ from robojackson.motion.reference_motion import ReferenceMotion, motions_of, pos
 from robojackson.robot.description import description_sha256
 from robojackson.robot.model import Robot
 
+OLDER_TQC = {"n_steps": 1}
+"""Numbers of TQC from before they could be chosen."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -37,10 +40,11 @@ class Task:
         )
 
     def completing(self, configuration: Mapping[str, object]) -> dict[str, object]:
-        """Return the configuration of a checkpoint whose task lacks what older ones did not
-        keep."""
-        kept = configuration["task"]
-        return {**configuration, "task": {**asdict(self), **kept}} if isinstance(kept, dict) else {}
+        """Return the configuration of a checkpoint that lacks what older ones did not keep."""
+        task, tqc = configuration["task"], configuration["tqc"]
+        if not (isinstance(task, dict) and isinstance(tqc, dict)):
+            return {}
+        return {**configuration, "task": {**asdict(self), **task}, "tqc": {**OLDER_TQC, **tqc}}
 
 
 @dataclass(frozen=True)

@@ -236,6 +236,21 @@ def test_a_checkpoint_from_before_the_yaml_was_kept_is_continued(
 
 
 @pytest.mark.medium
+def test_a_checkpoint_from_before_returns_over_several_steps_is_continued_with_one(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    one = dataclasses.replace(brief("sbx"), tqc=dataclasses.replace(SMALL, n_steps=1))
+    run(robot, sway, one, tmp_path / "out")
+    (kept,) = (tmp_path / "out").glob("checkpoint*/run.json")
+    state = json.loads(kept.read_text())
+    del state["configuration"]["tqc"]["n_steps"]
+    kept.write_text(json.dumps(state))
+    assert run(robot, sway, one, tmp_path / "out").steps == state["steps"]
+    with pytest.raises(BadConfiguration, match="another configuration"):
+        run(robot, sway, brief("sbx"), tmp_path / "out")
+
+
+@pytest.mark.medium
 @pytest.mark.parametrize("part", ["run.json", "networks.*", "environment.npz"])
 def test_a_damaged_checkpoint_is_refused_by_its_name(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path, part: str
