@@ -73,8 +73,9 @@ class OverlappedTQC(TQC):
             return
         self._acting = dense_layers(self.policy.actor_state.params)
         samples = buffer_of(self).sample(batch_size * gradient_steps)
-        discounts = np.full(batch_size * gradient_steps, self.gamma, np.float32)
-        if samples.discounts is not None:  # of returns over several steps
+        if samples.discounts is None:  # returns over one step
+            discounts = np.full(batch_size * gradient_steps, self.gamma, np.float32)
+        else:
             discounts = samples.discounts.numpy().flatten()
         data = ReplayBufferSamplesNp(
             samples.observations.numpy(),

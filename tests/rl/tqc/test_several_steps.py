@@ -1,5 +1,6 @@
 """Returns over several steps: what the critics learn from, against a sum over the replay buffer."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from robojackson.robot.model import Robot
 
 SMALL = TqcConfig(
     n_envs=2, warmup=8, batch=16, buffer=1000, actor=(24, 16), critic=(24, 16),
-    steps_per_round=4, updates_per_round=8,
+    steps_per_round=4, updates_per_round=8, policy_delay=1,
 )  # fmt: skip
 FALLS_AND_ENDS = 400
 """Steps of two robots, among them falls."""
@@ -47,7 +48,7 @@ def learnt_from(
 def test_a_target_adds_rewards_up_to_the_end_of_an_episode(
     robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch, steps: int
 ) -> None:
-    config = TqcConfig(**{**vars(SMALL), "n_steps": steps})
+    config = replace(SMALL, n_steps=steps)
     samples, buffer = learnt_from(robot, sway, monkeypatch, config)
     last, lengths, fell = buffer.pos - 1, list[int](), 0
     for i, observation in enumerate(samples.observations):
@@ -75,8 +76,7 @@ def test_a_target_adds_rewards_up_to_the_end_of_an_episode(
 def test_both_trainers_learn_from_as_many_steps(robot: Robot, sway: ReferenceMotion) -> None:
     env = environment(robot, sway)
     for name in ("sbx", "sb3"):
-        config = SMALL if name == "sbx" else TqcConfig(**{**vars(SMALL), "policy_delay": 1})
-        trainer = make_trainer(name, env, config, 0)
+        trainer = make_trainer(name, env, SMALL, 0)
         trainer.model.learn(8)
         assert trainer.model.replay_buffer.n_steps == SMALL.n_steps == 3
 
