@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
+from robojackson.api.feedback_pack import deployed_feedback
 from robojackson.api.pack_parts import (
     REFERENCE,
     beside,
@@ -28,6 +29,7 @@ from robojackson.formats.deploy.pack_readme import Figures
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.controllers import control_of
+from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import mode_of, observation_of
@@ -47,6 +49,7 @@ def write_deploy_pack(
     robot: RobotLike | None = None,
     evaluation: FilePath | None = None,
     licences: Mapping[str, str] | None = None,
+    progress: Progress = no_progress,
 ) -> Figures:
     """Write a policy that sees what a robot measures by itself, as a pack that runs alone.
 
@@ -58,6 +61,8 @@ def write_deploy_pack(
         evaluation: evaluation.json of `robojackson evaluate`, whose figures and passport go into
             the pack; None looks beside the policy.
         licences: Licences of inputs by kind, where nothing records them: `{"clip": "CC-BY-4.0"}`.
+        progress: Called with a name, the steps that are done, and all, while the feedback that the
+            policy was trained on top of is computed.
 
     Returns:
         What was written: files, inputs, layout, the passport's cases and its weakest, and what the
@@ -79,7 +84,10 @@ def write_deploy_pack(
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
     evaluated = evaluation_in(path.parent, evaluation)
-    files = pack_files(parts, machine, ingredients, evaluated)
+    feedback, control = None, control_of(found, machine)
+    if control.feedback:
+        feedback = deployed_feedback(control, motion, machine, progress)
+    files = pack_files(parts, machine, ingredients, evaluated, feedback)
     written = write_pack(Path(folder), files, ingredients, evaluated)
     layout = {"observations": parts.observation_size, "layout_sha256": parts.layout_sha256}
     return {"robot": motion.robot, **layout, **written}
@@ -156,11 +164,11 @@ def _require_onboard(policy: Policy) -> None:
             f"a policy of mode {mode_of(policy)} and law {kind}: a deploy pack needs mode track, "
             "law pd and --set track.observation=onboard"
         )
-    if law.get("feedback"):
+    if law.get("feedback") and law.get("root_state") != "estimated":
         raise BadPolicy(
-            "the policy was trained on the feedback along the reference, which needs the place and "
-            "the velocity that no real robot measures: train without track.control.feedback, or "
-            "write the feedback with estimates of both (export regulator_onboard --to deploy)"
+            "the policy was trained on the feedback along the reference from the exact place and "
+            "velocity, which no real robot measures: train with --set "
+            "track.control.root_state=estimated"
         )
 
 

@@ -22,9 +22,9 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
+from robojackson.rl.sim import leg_odometry
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors
-from robojackson.rl.trackers import leg_odometry
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot

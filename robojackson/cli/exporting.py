@@ -105,7 +105,10 @@ def _deploy(
                 str(source), pack.reference, out, robot=robot, progress=progress, **said
             )
     else:
-        made = write_deploy_pack(source, out, reference=pack.reference, robot=robot, **said)
+        with console.stages() as progress:
+            made = write_deploy_pack(
+                source, out, reference=pack.reference, robot=robot, progress=progress, **said
+            )
     made = dict(made)
     missing = _open_points(made)
     kind = "incomplete" if missing else "written"

@@ -13,7 +13,7 @@ from tests.fixtures.deploy_policies import random_policy, swaying
 from tests.fixtures.robots import stock
 
 FILES = {"policy.onnx", "policy_obs.onnx", "motion.npz", "deploy.yaml", "robot.xml", "run.py",
-         "README.md", "LICENCES.md", "licences.json"}  # fmt: skip
+         "simulated_robot.py", "README.md", "LICENCES.md", "licences.json"}  # fmt: skip
 COLUMNS = ("case", "strict_success", "success", "skill", "site_error_m", "kept")
 ROWS = [("nominal", 1.0, 1.0, 0.5, 0.02, 1.0), ("gains x 0.8", 0.75, 0.8, 0.4, 0.03, None)]
 
@@ -82,7 +82,7 @@ def test_a_policy_that_needs_the_feedback_of_the_full_state_is_refused(folder: P
     policy = random_policy(stock(), swaying(stock()))
     control = {**policy.facts["control"], "feedback": 1.0}  # type: ignore[dict-item]
     Policy(policy.layers, {**policy.facts, "control": control}).save(folder / "fed.safetensors")
-    with pytest.raises(BadPolicy, match=r"without track\.control\.feedback"):
+    with pytest.raises(BadPolicy, match=r"root_state=estimated"):
         export(folder / "fed.safetensors", "deploy", folder / "pack")
 
 

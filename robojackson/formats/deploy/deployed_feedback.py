@@ -39,7 +39,7 @@ class DeployedFeedback:
         soles: Points that carry the robot.
         feet: Points that `places` are of.
         imu: Place of the accelerometer in the frame of the root.
-        odometry: Constants of the estimate by the names of `rl.trackers.leg_odometry`.
+        odometry: Constants of the estimate by the names of `rl.sim.leg_odometry`.
     """
 
     machine: DeployedMachine

@@ -5,15 +5,15 @@ numpy and mujoco alone. README.md describes the interface of a real robot.
 """
 
 import hashlib
-import json
 import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from robojackson.formats.deploy.runner import PARSER, SimulatedRobot, main
+from robojackson.formats.deploy.runner import PARSER, main
 from robojackson.formats.deploy.runner import Runner as NetworkRunner
+from robojackson.formats.deploy.simulated_robot import SimulatedRobot
 from robojackson.formats.deploy.state_estimator import StateEstimator, matrix
 
 Array = np.ndarray
@@ -45,19 +45,15 @@ class ImuRobot(SimulatedRobot):
 class Runner(NetworkRunner):
     """The feedback and its motion, in the frame of the motion; refuses parts that do not fit."""
 
-    def __init__(self, folder: Path = Path(__file__).parent, robot: ImuRobot | None = None) -> None:
-        lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
-        pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
-        self.cfg = cfg = {key: json.loads(value) for key, _, value in pairs}
-        self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
-        machine = robot or ImuRobot(self.model, cfg)
-        machine.imu, self.force = np.array(cfg["imu"]), machine.force
-        self.pose, self.robot = mujoco.MjData(self.model), machine
-        keys = ("default_joint_pos", "stiffness", "damping")
-        self.default, self.kp, self.kd = (np.array(cfg[key]) for key in keys)
-        if self.robot.joints != cfg["joint_names"]:
-            raise SystemExit(f"refused: the robot's joints are {self.robot.joints}")
-        if hashlib.sha256((folder / "feedback.npz").read_bytes()).hexdigest() != cfg["feedback"]:
+    machine = ImuRobot
+
+    def load(self, folder: Path) -> None:
+        """Load gains and motion."""
+        self.robot.imu = np.array(self.cfg["imu"])
+        if (
+            hashlib.sha256((folder / "feedback.npz").read_bytes()).hexdigest()
+            != self.cfg["feedback"]
+        ):
             raise SystemExit("refused: feedback.npz is not the one of deploy.yaml")
         with np.load(folder / "feedback.npz") as arrays:
             self.rows = {name: arrays[name].astype(float) for name in arrays.files}
@@ -67,7 +63,7 @@ class Runner(NetworkRunner):
     def begin(self, row: int) -> None:
         """Start at a row of the motion, which is turned to where the robot faces."""
         super().begin(row)
-        self.state = StateEstimator(self.model, self.cfg)
+        self.passed, self.state = row, StateEstimator(self.model, self.cfg)
 
     def at(self, step: int) -> dict[str, Array]:
         """Return the motion and its feedback at a step; one that repeats travels on."""
@@ -78,30 +74,28 @@ class Runner(NetworkRunner):
             place += cycle * np.array(self.cfg["cycle_offset"])
         return found
 
+    def aimed(self, ahead: dict[str, Array], *measured: Array) -> Array:
+        """Return the targets that the feedback moves."""
+        return ahead["targets"]
+
     def step(self) -> str:
         """Run one control step towards the next row; return the reason for a stop, else nothing."""
-        now, ahead = self.at(self.row), self.at(self.row + 1)
-        quat, gyro, angle, rate = self.robot.read()
+        now, ahead = self.at(self.passed), self.at(self.passed + 1)
+        self.passed, last = self.passed + 1, len(self.roots) - 1
+        self.row = self.passed % (last + 1) if self.cfg["cyclic"] else min(self.passed, last)
+        measured = quat, gyro, angle, rate = self.robot.read()
+        target = self.aimed(ahead, *measured)
         turned, apart, limit = np.zeros(4), np.zeros(self.model.nv), self.cfg["feedback_limit"]
         mujoco.mju_mulQuat(turned, self.turn * [1, -1, -1, -1], quat)
         upright = (matrix(turned).T @ matrix(ahead["qpos"][3:7]))[2, 2]
-        self.row, self.tilt = self.row + 1, float(np.arccos(np.clip(upright, -1, 1)))
+        self.tilt = float(np.arccos(np.clip(upright, -1, 1)))
         qpos, qvel = np.array([0, 0, 0, *turned, *angle]), np.array([0, 0, 0, *gyro, *rate])
-        qpos, qvel = self.state.estimate(ahead, qpos, qvel, self.force())
+        qpos, qvel = self.state.estimate(ahead, qpos, qvel, self.robot.force())
         mujoco.mj_differentiatePos(self.model, apart, 1.0, now["path_qpos"], qpos)
         feet, _, shares = self.state.points("feet", qpos, qvel, self.cfg["odometry"]["foot_low"])
         apart[:2] -= shares @ (feet - now["places"])[:, :2]
         moved = now["gain"] @ [*apart, *(qvel - now["path_qvel"])] + now["offset"]
-        target = ahead["targets"] - np.clip(moved, np.negative(limit), limit)
-        return self.drive_or_stop(target, rate)
-
-    def drive_or_stop(self, target: Array, rate: Array) -> str:
-        """Drive the robot, unless it is lost; return the reason for a stop, else nothing."""
-        fast = np.abs(rate) > 2 * np.array(self.cfg["limits"]["speed"])
-        if self.tilt > self.cfg["stop_tilt"] or fast.any() or not np.isfinite(target).all():
-            return f"leans {self.tilt:.2f} rad from the motion, {fast.sum()} joints too fast"
-        self.robot.drive(target, self.kp, self.kd)
-        return ""
+        return self.drive_or_stop(target - np.clip(moved, np.negative(limit), limit), rate)
 
 
 if __name__ == "__main__":

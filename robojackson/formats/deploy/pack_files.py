@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration
@@ -16,26 +16,33 @@ from robojackson.formats.deploy.licence_passport import (
     passport_json,
     passport_markdown,
 )
-from robojackson.formats.deploy.pack_readme import Figures, feedback_readme, policy_readme
+from robojackson.formats.deploy.pack_readme import (
+    Figures,
+    feedback_readme,
+    policy_readme,
+    polished_readme,
+)
 from robojackson.formats.deploy.policy_graph import MOTION, policy_graph
 from robojackson.formats.deploy.robot_xml import robot_xml
-from robojackson.formats.deploy.settings_yaml import feedback_yaml, metadata, settings_yaml
+from robojackson.formats.deploy.settings_yaml import (
+    feedback_yaml,
+    metadata,
+    polished_yaml,
+    settings_yaml,
+)
 from robojackson.robot.body_states import require_same_joints
 from robojackson.robot.model import Robot
 from robojackson.robot.sampling import sampled
 
-RUNNER = Path(__file__).with_name("runner.py")
-PARTS = {
-    "run.py": Path(__file__).with_name("feedback_runner.py"),
-    "network_runner.py": RUNNER,
-    "state_estimator.py": Path(__file__).with_name("state_estimator.py"),
+OF_NETWORK = {"run.py": "runner", "simulated_robot.py": "simulated_robot"}
+OF_FEEDBACK = {
+    "run.py": "feedback_runner",
+    "network_runner.py": "runner",
+    "simulated_robot.py": "simulated_robot",
+    "state_estimator.py": "state_estimator",
 }
-"""Modules of a pack without a network."""
-MODULES = {
-    "robojackson.formats.deploy.runner": "network_runner",
-    "robojackson.formats.deploy.state_estimator": "state_estimator",
-}
-"""Names of their imports here and in a pack."""
+OF_BOTH = OF_FEEDBACK | {"run.py": "polished_runner", "feedback_runner.py": "feedback_runner"}
+"""Modules of the kinds of packs by the names of their files."""
 
 
 def pack_files(
@@ -43,10 +50,12 @@ def pack_files(
     robot: Robot,
     ingredients: list[Ingredient],
     evaluation: Figures | None = None,
+    feedback: DeployedFeedback | None = None,
 ) -> dict[str, bytes]:
-    """Return the content of every file of a pack.
+    """Return the content of every file of a pack with a network.
 
     Args:
+        feedback: What the policy was trained on top of; only the pack's own runner knows it.
         evaluation: Content of evaluation.json, with `passport` where one was made.
 
     Raises:
@@ -67,15 +76,26 @@ def pack_files(
         for name in MOTION
     }
     about = metadata(policy)
-    own = {
+    network = {
         "policy.onnx": policy_graph(policy, held, about, "mjlab"),
-        "policy_obs.onnx": policy_graph(policy, held, about, "plain"),
         "motion.npz": npz_archive.pack(motion),
-        "deploy.yaml": settings_yaml(policy),
-        "run.py": RUNNER.read_bytes(),
-        "README.md": policy_readme(policy, evaluation),
     }
-    return own | _common(robot, ingredients, evaluation)
+    if feedback is None:
+        own = {
+            "policy_obs.onnx": policy_graph(policy, held, about, "plain"),
+            "deploy.yaml": settings_yaml(policy),
+            "README.md": policy_readme(policy, evaluation),
+            **_modules(OF_NETWORK),
+        }
+    else:
+        rows = feedback.archive()
+        own = {
+            "feedback.npz": rows,
+            "deploy.yaml": polished_yaml(policy, feedback, hashlib.sha256(rows).hexdigest()),
+            "README.md": polished_readme(policy, evaluation),
+            **_modules(OF_BOTH),
+        }
+    return network | own | _common(robot, ingredients, evaluation)
 
 
 def feedback_files(
@@ -89,7 +109,7 @@ def feedback_files(
     require_same_joints(feedback.machine.reference, robot.model)
     rows = feedback.archive()
     own = {
-        **{name: _alone(path) for name, path in PARTS.items()},
+        **_modules(OF_FEEDBACK),
         "feedback.npz": rows,
         "deploy.yaml": feedback_yaml(feedback, hashlib.sha256(rows).hexdigest()),
         "README.md": feedback_readme(feedback, evaluation),
@@ -97,12 +117,16 @@ def feedback_files(
     return own | _common(robot, ingredients, evaluation)
 
 
-def _alone(module: Path) -> bytes:
-    """Return a module whose imports are from the pack."""
-    text = module.read_text(encoding="utf-8")
-    for here, there in MODULES.items():
-        text = text.replace(here, there)
-    return text.encode()
+def _modules(names: Mapping[str, str]) -> dict[str, bytes]:
+    """Return modules whose imports are from the pack, by the names of their files."""
+    found = {}
+    for file, module in names.items():
+        text = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
+        for other, imported in names.items():
+            here = f"from {__package__}.{imported} import"
+            text = text.replace(here, f"from {other.removesuffix('.py')} import")
+        found[file] = text.encode()
+    return found
 
 
 def _common(

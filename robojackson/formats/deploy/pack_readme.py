@@ -18,6 +18,7 @@ FILES = """\
 |---|---|
 | `run.py` | runs it: `pip install numpy onnxruntime mujoco`, `python run.py --view` |
 | `policy.onnx` | `obs`, `time_step` in; `actions` and the motion out, as mjlab exports |
+| `simulated_robot.py` | the robot that it drives, in MuJoCo |
 | `policy_obs.onnx` | the same function, `obs` in, `actions` out, for Unitree's C++ runner |
 | `motion.npz` | the motion for mjlab; the command of a control step is one row ahead |
 | `deploy.yaml` | joint order, gains, limits, scale, layout; Unitree's keys first |
@@ -27,9 +28,26 @@ FEEDBACK_FILES = """\
 |---|---|
 | `run.py` | runs it: `pip install numpy mujoco`, `python run.py --view` |
 | `state_estimator.py` | what it knows of itself from what it measures |
-| `network_runner.py` | the part that packs with a network share: robot, start, stop |
+| `network_runner.py` | the part that packs with a network share: start and stop |
+| `simulated_robot.py` | the robot that it drives, in MuJoCo |
 | `feedback.npz` | targets, gains and the path that they keep the robot on, a row a control step |
 | `deploy.yaml` | joint order, gains, limits, soles, accelerometer, odometry; Unitree's keys first |
+"""
+POLISHED_FILES = """\
+| file | what |
+|---|---|
+| `run.py` | runs it: `pip install numpy onnxruntime mujoco`, `python run.py --view` |
+| `feedback_runner.py`, `network_runner.py` | its parts |
+| `state_estimator.py` | what it knows of itself from what it measures |
+| `simulated_robot.py` | the robot that it drives, in MuJoCo |
+| `policy.onnx` | `obs`, `time_step` in; `actions` and the motion out, as mjlab exports |
+| `motion.npz` | the motion for mjlab; the command of a control step is one row ahead |
+| `feedback.npz` | gains and the path that they keep the robot on, a row a control step |
+| `deploy.yaml` | joint order, gains, limits, layout, soles, accelerometer; Unitree's keys first |
+"""
+NOT_ALONE = """\
+The network was trained on top of the feedback: mjlab's and Unitree's runners, which do not know the
+feedback, would let the robot fall.
 """
 ESTIMATE = """\
 ## What it measures and what it estimates
@@ -100,6 +118,21 @@ def feedback_readme(feedback: DeployedFeedback, figures: Figures | None) -> byte
     safety = SAFETY.format(refused=OF_FEEDBACK, also="and `force()`")
     files = FEEDBACK_FILES.strip() + "\n" + COMMON
     return _text([_head(feedback.machine, tail), files, ESTIMATE, *_figures(figures), safety])
+
+
+def polished_readme(policy: DeployedPolicy, figures: Figures | None) -> bytes:
+    """Return the content of the file for a network on top of feedback; arguments of
+    `policy_readme`."""
+    tail = (
+        f"{policy.observation_size} inputs (layout `{policy.layout_sha256[:12]}`), "
+        "target = default_joint_pos + action_scale * action, moved by linear feedback."
+    )
+    refused = f"{OF_NETWORK}, or when `feedback.npz` is of another pack"
+    safety = SAFETY.format(refused=refused, also="and `force()`")
+    own = [_head(policy.machine, tail), POLISHED_FILES.strip() + "\n" + COMMON, NOT_ALONE]
+    own.append(_terms(policy))
+    estimate = ESTIMATE.replace("`targets`", "the network's target")
+    return _text([*own, estimate, *_figures(figures), safety])
 
 
 def _text(parts: Sequence[str]) -> bytes:

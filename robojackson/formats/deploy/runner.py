@@ -8,7 +8,6 @@ import hashlib
 import json
 import signal
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,57 +15,42 @@ import mujoco
 import mujoco.viewer
 import numpy as np
 
+from robojackson.formats.deploy.simulated_robot import SimulatedRobot
+
 PARSER = argparse.ArgumentParser(description=__doc__)
 PARSER.add_argument("--seconds", type=float, default=10.0, help="of the dance")
 PARSER.add_argument("--soft-start", type=float, default=3.0, help="seconds, hung up")
 PARSER.add_argument("--view", action="store_true", help="MuJoCo's viewer, in real time")
 
 
-class SimulatedRobot:
-    """MuJoCo's robot behind the interface of a real one; its limits always hold."""
-
-    def __init__(self, model: mujoco.MjModel, cfg: dict[str, Any]) -> None:
-        self.model, self.data, self.viewer = model, mujoco.MjData(model), None
-        self.hung: Any = None  # pose of the root while hung up
-        self.joints = [model.joint(i).name for i in range(1, model.njnt)]
-        self.motors = np.argsort(model.actuator_trnid[:, 0])
-        self.limits = {name: np.array(value) for name, value in cfg["limits"].items()}
-        self.substeps = round(cfg["step_dt"] / model.opt.timestep)
-
-    def read(self) -> tuple[np.ndarray, ...]:
-        """Return the root's attitude (wxyz), the gyroscope in its axes, joint angles and speeds."""
-        qpos, qvel = self.data.qpos.copy(), self.data.qvel.copy()
-        return qpos[3:7], qvel[3:6], qpos[7:], qvel[6:]
-
-    def drive(self, target: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> None:
-        """Run one control step of the PD law, within the limits of joints, torque and speed."""
-        most, fastest = self.limits["torque"], self.limits["speed"]
-        target = np.clip(target, self.limits["lower"], self.limits["upper"])
-        for _ in range(self.substeps):
-            angle, rate = self.data.qpos[7:], self.data.qvel[6:]
-            torque = np.clip(stiffness * (target - angle) - damping * rate, -most, most)
-            torque[(np.abs(rate) > fastest) & (torque * rate > 0)] = 0.0
-            self.data.ctrl[self.motors] = torque / self.model.actuator_gear[self.motors, 0]
-            mujoco.mj_step(self.model, self.data)
-            if self.hung is not None:
-                self.data.qpos[:7], self.data.qvel[:6] = self.hung, 0.0
-        if self.viewer:
-            self.viewer.sync()
-            time.sleep(self.substeps * self.model.opt.timestep)
+def settings(folder: Path) -> dict[str, Any]:
+    """Return the content of deploy.yaml."""
+    lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
+    pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
+    return {key: json.loads(value) for key, _, value in pairs}
 
 
 class Runner:
     """The policy and its motion on a robot; refuses a pack whose parts do not fit each other."""
 
+    machine: Any = SimulatedRobot
+
     def __init__(self, folder: Path = Path(__file__).parent, robot: Any = None) -> None:
+        self.cfg = cfg = settings(folder)
+        self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
+        self.pose = mujoco.MjData(self.model)
+        self.robot: Any = robot or self.machine(self.model, cfg)
+        keys = ("default_joint_pos", "stiffness", "damping")
+        self.default, self.kp, self.kd = (np.array(cfg[key]) for key in keys)
+        if self.robot.joints != cfg["joint_names"]:
+            raise SystemExit(f"refused: the robot's joints are {self.robot.joints}")
+        self.load(folder)
+
+    def load(self, folder: Path) -> None:
+        """Load network and motion."""
         import onnxruntime
 
-        lines = (folder / "deploy.yaml").read_text(encoding="utf-8").splitlines()
-        pairs = (line.partition(": ") for line in lines if line and line[0] != "#")
-        self.cfg = cfg = {key: json.loads(value) for key, _, value in pairs}
-        self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
-        self.pose, self.robot = mujoco.MjData(self.model), robot or SimulatedRobot(self.model, cfg)
-        options = onnxruntime.SessionOptions()
+        cfg, options = self.cfg, onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         self.session = onnxruntime.InferenceSession(str(folder / "policy.onnx"), options)
         motion = np.load(folder / "motion.npz")
@@ -74,10 +58,7 @@ class Runner:
         poses = np.concatenate([motion["body_pos_w"], motion["body_quat_w"]], 2).astype(float)
         names, self.anchor = motion["body_names"].tolist(), cfg["anchor_body_name"]
         self.roots, self.anchors = poses[:, 0], poses[:, names.index(self.anchor), 3:]
-        keys = ("default_joint_pos", "action_scale", "stiffness", "damping")
-        self.default, self.scale, self.kp, self.kd = (np.array(cfg[key]) for key in keys)
-        if self.robot.joints != cfg["joint_names"]:
-            raise SystemExit(f"refused: the robot's joints are {self.robot.joints}")
+        self.scale = np.array(cfg["action_scale"])
         self.begin(0)
         terms = {name: value.size for name, value in self.observe(*self.robot.read()).items()}
         layout = json.dumps([list(terms.items()), self.robot.joints, self.anchor])
@@ -107,19 +88,26 @@ class Runner:
         terms |= {"base_ang_vel": gyro, "joint_pos": angle - self.default, "joint_vel": rate}
         return terms | {"actions": self.action}
 
+    def act(self, *measured: Any) -> np.ndarray:
+        """Return the network's targets at the row; no numbers where it is given none."""
+        obs = np.concatenate(list(self.observe(*measured).values())).astype(np.float32)[None]
+        feed = {"obs": obs, "time_step": np.full((1, 1), self.row, np.float32)}
+        self.action = self.session.run(["actions"], feed)[0][0].astype(float)
+        return np.asarray(self.default + self.scale * self.action + 0 * obs.sum())
+
     def step(self) -> str:
         """Run one control step towards the next row; return the reason for a stop, else nothing."""
         ahead, last = self.row + 1, len(self.command) - 1
         self.row = ahead % (last + 1) if self.cfg["cyclic"] else min(ahead, last)
-        terms = self.observe(*self.robot.read())
-        obs = np.concatenate(list(terms.values())).astype(np.float32)[None]
-        feed = {"obs": obs, "time_step": np.full((1, 1), self.row, np.float32)}
-        self.action = self.session.run(["actions"], feed)[0][0].astype(float)
-        fast = np.abs(terms["joint_vel"]) > 2 * np.array(self.cfg["limits"]["speed"])
-        known = np.isfinite([*obs[0], *self.action]).all()
-        if self.tilt > self.cfg["stop_tilt"] or fast.any() or not known:
+        measured = self.robot.read()
+        return self.drive_or_stop(self.act(*measured), measured[3])
+
+    def drive_or_stop(self, target: np.ndarray, rate: np.ndarray) -> str:
+        """Drive the robot, unless it is lost; return the reason for a stop, else nothing."""
+        fast = np.abs(rate) > 2 * np.array(self.cfg["limits"]["speed"])
+        if self.tilt > self.cfg["stop_tilt"] or fast.any() or not np.isfinite(target).all():
             return f"leans {self.tilt:.2f} rad from the motion, {fast.sum()} joints too fast"
-        self.robot.drive(self.default + self.scale * self.action, self.kp, self.kd)
+        self.robot.drive(target, self.kp, self.kd)
         return ""
 
 

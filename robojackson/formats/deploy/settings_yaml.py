@@ -28,6 +28,17 @@ HEAD = """\
 
 def settings_yaml(policy: DeployedPolicy) -> bytes:
     """Return the content of the file for a network."""
+    return _text(_of_network(policy))
+
+
+def polished_yaml(policy: DeployedPolicy, feedback: DeployedFeedback, sha256: str) -> bytes:
+    """Return the content of the file for a network on top of feedback; arguments of the two."""
+    network = _of_network(policy)
+    network["limits"] |= _reach(feedback, policy.action_scale)
+    return _text(network | _of_feedback(feedback, sha256))
+
+
+def _of_network(policy: DeployedPolicy) -> Settings:
     machine = _of_machine(policy.machine)
     scale = _numbers(policy.action_scale)
     action = {
@@ -49,7 +60,7 @@ def settings_yaml(policy: DeployedPolicy) -> bytes:
         "observation_terms": _offsets(policy),
         "layout": [policy.layout_sha256, policy.observation_size],
     }
-    return _text(machine | unitree | ours)
+    return machine | unitree | ours
 
 
 def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
@@ -58,7 +69,13 @@ def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
     Args:
         sha256: Digest of feedback.npz.
     """
-    ours = {
+    machine = _of_machine(feedback.machine)
+    machine["limits"] |= _reach(feedback)
+    return _text(machine | _of_feedback(feedback, sha256))
+
+
+def _of_feedback(feedback: DeployedFeedback, sha256: str) -> Settings:
+    return {
         "cycle_offset": _numbers(feedback.machine.reference.cycle_offset),
         "imu": list(feedback.imu),
         "soles": [ball.as_row() for ball in feedback.soles],
@@ -67,16 +84,13 @@ def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
         "odometry": feedback.odometry,
         "feedback": sha256,
     }
-    machine = _of_machine(feedback.machine)
-    machine["limits"] |= _reach(feedback)
-    return _text(machine | ours)
 
 
-def _reach(feedback: DeployedFeedback) -> dict[str, list[float]]:
-    """Return the limits of the targets: the joints' ranges, and beyond them what the feedback may
-    ask for. A target beyond a joint's end is a torque there, whose limit holds; without it a robot
-    with bent knees or ankles cannot be caught."""
-    own, most = limits(feedback.machine), feedback.limit
+def _reach(feedback: DeployedFeedback, action: np.ndarray | float = 0.0) -> dict[str, list[float]]:
+    """Return the limits of the targets: the joints' ranges, and beyond them what the feedback and
+    the largest action, rad, may ask for. A target beyond a joint's end is a torque there, whose
+    limit holds; without it a robot with bent knees or ankles cannot be caught."""
+    own, most = limits(feedback.machine), feedback.limit + action
     lowest, highest = feedback.targets.min(0) - most, feedback.targets.max(0) + most
     return {
         "lower": _numbers(np.minimum(own["lower"], lowest)),

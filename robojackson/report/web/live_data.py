@@ -4,6 +4,8 @@ rule.
 Metres, radians, seconds, newton-metres.
 """
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 
@@ -42,7 +44,8 @@ def live_data(
 ) -> dict[str, object] | None:
     """Return the data of a live dance; None where a browser cannot run it.
 
-    A browser cannot run a policy of the paper's mode, a tracker whose network is a file of another
+    A browser cannot run a policy of the paper's mode, feedback from an estimated root, a tracker
+    whose network is a file of another
     project, or a robot whose meshes collide.
     """
     if not runs_in_a_browser(policy):
@@ -99,7 +102,9 @@ def runs_in_a_browser(policy: Evaluated) -> bool:
     """Return whether a policy's network is one of ours without extras, or it has none; a page knows
     the root's place and velocity, and estimates none."""
     if isinstance(policy, Policy):
-        return mode_of(policy) == "track"
+        held = policy.facts.get("control")
+        law = held if isinstance(held, Mapping) else {}
+        return mode_of(policy) == "track" and law.get("root_state") != "estimated"
     if isinstance(policy, RegulatorTracker):
         return policy.description.root_state == "exact"
     return isinstance(policy, PolicyTracker)

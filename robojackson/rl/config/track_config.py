@@ -26,7 +26,10 @@ class ControlConfig:
             unitless; 0 follows the angles alone; the robot's when null.
         feedback: Share of the linear-quadratic feedback along the reference by which the targets
             move, unitless; 0 leaves balance to the policy alone; when null the robot's, or 0 where
-            the policy does not see the full state.
+            the policy does not see the full state and `root_state` is null, too.
+        root_state: Place and velocity of the root in the feedback: `exact`, as a simulation knows
+            them, or `estimated` from a robot's own measurements (`rl.sim.leg_odometry`); when null
+            as the policy sees them: `exact`, or `estimated` for `onboard` and `preview`.
         feedback_path: What the feedback keeps the robot on: the `reference`, or, where that falls,
             a path beside it that simulations with `sampled` offsets have found, wherever the feet
             stand; the robot's when null.
@@ -43,6 +46,7 @@ class ControlConfig:
     damping: float | None = Field(default=None, ge=0)
     feedforward: float | None = Field(default=None, ge=0, le=2)
     feedback: float | None = Field(default=None, ge=0, le=2)
+    root_state: Literal["exact", "estimated"] | None = None
     feedback_path: FeedbackPath | None = None
     residual: float | None = Field(default=None, gt=0)
     arm_residual: float | None = Field(default=None, gt=0)

@@ -126,8 +126,10 @@ class TrackingCore:
             name: getattr(self, name).copy() for name in ("step_index", "_start", "_age", "_last")
         }
         seen = {f"sim_{name}": getattr(self.sim, name).copy() for name in OBSERVED}
+        estimate = self.sim.root_estimate
+        felt = {} if estimate is None else estimate.state()
         counted = {"episode": np.array(self.episode), "physics": physics}
-        return {**own, **seen, **counted, **self._totals.state(), **self.mode.state()}
+        return {**own, **seen, **felt, **counted, **self._totals.state(), **self.mode.state()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restore the environment from `state`."""
@@ -137,6 +139,8 @@ class TrackingCore:
             setattr(self, name, np.array(state[name]))
         for name in OBSERVED:
             getattr(self.sim, name)[:] = state[f"sim_{name}"]
+        if self.sim.root_estimate is not None:
+            self.sim.root_estimate.restore(state)
         self.episode = int(state["episode"])
         self._totals.restore(state)
         self.mode.restore(state)

@@ -23,13 +23,24 @@ class StepFeedback:
     places: Float[np.ndarray, "N F 3"]
 
     def targets(
-        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        beside_feet: bool = False,
     ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad."""
+        """Return the offsets of the motors' targets, rad.
+
+        Args:
+            beside_feet: Whether to follow the motion from where the feet of each robot stand, as a
+                sampled path is always followed.
+        """
         apart = state_difference(qpos, qvel, self.qpos, self.qvel)
-        moved = np.isfinite(self.places[:, 0, 0])
+        places, moved = self.places, np.isfinite(self.places[:, 0, 0])
+        if beside_feet and not moved.all():
+            places = np.where(moved[:, None, None], places, self.feet.places(self.qpos))
+            moved = np.ones(len(moved), bool)
         if moved.any():
-            apart[moved, :2] -= self.feet.apart(qpos[moved], self.places[moved])
+            apart[moved, :2] -= self.feet.apart(qpos[moved], places[moved])
         turned = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
         result: np.ndarray = -np.clip(turned, -self.limit, self.limit)
         return result

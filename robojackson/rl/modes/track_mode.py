@@ -151,11 +151,14 @@ class TrackMode:
 
 
 def control_of(config: TrackConfig) -> ControlConfig:
-    """Return the control law of a training: feedback of the full state is only for policies that
-    see it."""
-    if config.observation == "full" or config.control.feedback is not None:
-        return config.control
-    return replace(config.control, feedback=0.0)
+    """Return the control law of a training: without the full state, feedback is only where it is
+    asked for, and from an estimate of the root unless that is told otherwise."""
+    control = config.control
+    if config.observation in ("full", "full_preview"):
+        return control
+    if control.feedback is None and control.root_state is None:
+        return replace(control, feedback=0.0)
+    return replace(control, root_state=control.root_state or "estimated")
 
 
 def evaluate_step(

@@ -31,6 +31,10 @@ class SeededEach:
         rest = () if isinstance(size, int) else size[1:]
         return np.array([rng.uniform(low, high, rest) for rng in self._rngs])
 
+    def standard_normal(self, size: tuple[int, ...]) -> np.ndarray:
+        """Return what every generator gives; the first axis is that of the robots."""
+        return np.array([rng.standard_normal(size[1:]) for rng in self._rngs])
+
 
 class Disturbances:
     """Pushes and sensor noise of N robots.
@@ -66,6 +70,10 @@ class Disturbances:
         for i, turn in enumerate(turns):
             mujoco.mju_quatIntegrate(qpos[i, 3:7], turn, 1.0)
         return qpos, qvel
+
+    def accelerometer_noise(self) -> Float[np.ndarray, "N 3"]:
+        """Return noise of this control step, normally distributed, in standard deviations."""
+        return self._rng(3).standard_normal((self._n, 3))
 
     def after_step(self, datas: Sequence[mujoco.MjData], active: Bool[np.ndarray, " N"]) -> None:
         """Count a control step and push the robots whose push is due."""

@@ -5,7 +5,7 @@ offsets. A motion that is not cyclic holds its last step. Step s of the m-th mot
 * STRIDE + s`. Frames and units as in `ReferenceMotion`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -24,9 +24,28 @@ class StepLaw(Protocol):
     """Offsets of the targets of N robots at one step of their references."""
 
     def targets(
-        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        beside_feet: bool = False,
     ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad."""
+        """Return the offsets of the motors' targets, rad.
+
+        Args:
+            beside_feet: Whether to follow the motion from where the feet of each robot stand.
+        """
+
+
+class StepCorrection(Protocol):
+    """Offsets of the targets on the way to one step."""
+
+    def __call__(
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        beside_feet: bool = False,
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return `StepLaw.targets`."""
 
 
 class Law(Protocol):
@@ -49,8 +68,7 @@ class ClipStep:
         phase: Phase of the motion, 0..1.
         lead: Offset of the motors' targets from the reference's angles, rad; None without one.
         preview: Preview of the steps ahead (`preview.preview_of`); None without one.
-        feedback: Function of qpos and qvel that returns the offsets of the targets on the way to
-            this step, rad; None without one.
+        feedback: The offsets of the targets on the way to this step; None without one.
     """
 
     step: Int[np.ndarray, " N"]
@@ -61,7 +79,7 @@ class ClipStep:
     phase: Float[np.ndarray, " N"]
     lead: Float[np.ndarray, "N nu"] | None = None
     preview: Float[np.ndarray, "N P"] | None = None
-    feedback: Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None = None
+    feedback: StepCorrection | None = None
 
     def angles(self, hinge: Int[np.ndarray, " nu"]) -> Float[np.ndarray, "N nu"]:
         """Return the motors' targets that follow the step, with its lead and without feedback.
@@ -164,17 +182,19 @@ class Clip:
         preview = None if self._preview is None else self._preview[row]
         return ClipStep(step, *arrays, lead, preview, self._feedback(step))
 
-    def _feedback(
-        self, step: np.ndarray
-    ) -> Callable[[np.ndarray, np.ndarray], Float[np.ndarray, "N nu"]] | None:
+    def _feedback(self, step: np.ndarray) -> StepCorrection | None:
         """Return the feedback on the way to each step."""
         law = self._law
         if law is None:
             return None
 
-        def targets(qpos: np.ndarray, qvel: np.ndarray) -> Float[np.ndarray, "N nu"]:
+        def targets(
+            qpos: Float[np.ndarray, "N nq"],
+            qvel: Float[np.ndarray, "N nv"],
+            beside_feet: bool = False,
+        ) -> Float[np.ndarray, "N nu"]:
             row, shift, _ = self._split(step - 1)
-            return law.at(row, shift).targets(qpos, qvel)
+            return law.at(row, shift).targets(qpos, qvel, beside_feet)
 
         return targets
 

@@ -4,6 +4,7 @@ Few, so that the processor's cache still holds a robot at its next substep: a ba
 robots at a time is 5 % faster than one over 32. Radians, seconds, newton-metres; actuator order.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,18 @@ from robojackson.rl.sim.motors import Motors
 
 SIZE = 8
 """Number of robots in a batch."""
+
+
+def without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return the model without sensors: `mj_step` moves it identically, to the bit, and faster.
+
+    An accelerometer alone needs the accelerations and forces of all bodies in every substep.
+    """
+    if not model.nsensor:
+        return model
+    quick = copy.copy(model)
+    quick.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    return quick
 
 
 @dataclass(frozen=True)

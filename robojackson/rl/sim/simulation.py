@@ -9,7 +9,6 @@ World frame, metres, radians, seconds, newton-metres. MuJoCo releases the interp
 `mj_step`, so two threads keep two cores busy.
 """
 
-import copy
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -31,8 +30,9 @@ from robojackson.rl.sim.motors import (
     gains,
     residual_scale,
 )
-from robojackson.rl.sim.reference_clip import ClipStep
-from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass
+from robojackson.rl.sim.reference_clip import ClipStep, StepCorrection
+from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass, without_sensors
+from robojackson.rl.sim.root_estimate import RootEstimate
 from robojackson.rl.sim.variation import varied_models
 from robojackson.robot.model import Robot
 
@@ -82,18 +82,6 @@ def require_same_clock(simulation_dt: float, reference_dt: float) -> None:
         )
 
 
-def without_sensors(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return the model without sensors: `mj_step` moves it identically, to the bit, and faster.
-
-    An accelerometer alone needs the accelerations and forces of all bodies in every substep.
-    """
-    if not model.nsensor:
-        return model
-    quick = copy.copy(model)
-    quick.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-    return quick
-
-
 class Simulation:
     """N copies of a robot.
 
@@ -104,6 +92,7 @@ class Simulation:
         qpos, qvel: State of every copy after the last `step` or `place`.
         previous: Targets of the previous control step; at first the own angles, or no torque.
         count, push_at: Counters of the disturbances (`Disturbances`).
+        root_estimate: Of copies that do not know where their root is; None where they do.
         broken: Copies whose state diverged since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
         com: Centres of mass as `Humanoid-v5` sees them, one substep behind; law `torque` only.
@@ -152,6 +141,8 @@ class Simulation:
         self.points = np.zeros((n, len(robot.keypoint_names), 3))
         self.com = np.zeros((n, 3))
         self.broken = np.zeros(n, bool)
+        estimates = control.root_state == "estimated"
+        self.root_estimate = RootEstimate(robot, self, n) if estimates else None
 
     def place(
         self,
@@ -169,6 +160,8 @@ class Simulation:
             angles = data.qpos[7:][self.motors.hinge]
             self.previous[i] = 0.0 if self.control.law == "torque" else angles
         self._gather(indices)
+        if self.root_estimate:
+            self.root_estimate.begin(indices)
 
     def step(
         self, targets: Float[np.ndarray, "N nu"], active: Bool[np.ndarray, " N"] | None = None
@@ -190,6 +183,8 @@ class Simulation:
         raised = np.concatenate(self._views.warnings).reshape(self.n, -1)
         self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
         self._gather_all()
+        if self.root_estimate:
+            self.root_estimate.after_step()
 
     def sensed(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
         """Return qpos and qvel as the sensors measure them."""
@@ -199,13 +194,20 @@ class Simulation:
         """Return the target hinge angles of a reference step without a policy, rad."""
         angles = step.angles(self.motors.hinge)
         if step.feedback is not None and self.control.feedback:
-            angles = angles + step.feedback(*self.sensed())
+            angles = angles + self._correction(step, step.feedback)
         return angles
 
     def close(self) -> None:
         """Stop the threads."""
         if self._pool is not None:
             self._pool.shutdown()
+
+    def _correction(self, step: ClipStep, feedback: StepCorrection) -> Float[np.ndarray, "N nu"]:
+        """Return the offsets of the targets by the feedback, rad."""
+        if self.root_estimate is None:
+            return feedback(*self.sensed())
+        noise = self._disturbances.accelerometer_noise()
+        return feedback(*self.root_estimate.of(*self.sensed(), step, noise), beside_feet=True)
 
     def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
         """Return the copies of one thread, a batch at a time."""

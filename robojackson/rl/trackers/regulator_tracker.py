@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.feedback.standing_feet import Feet
+from robojackson.rl.sim.leg_odometry import LegOdometry
 from robojackson.rl.sim.motors import Motors
+from robojackson.rl.sim.reference_clip import StepCorrection
 from robojackson.rl.trackers.equipment import require_robot
-from robojackson.rl.trackers.leg_odometry import LegOdometry
 from robojackson.rl.trackers.tracker import Follower, TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
@@ -26,7 +26,7 @@ class RegulatorTracker:
     def __init__(self, description: TrackerDescription, path: Path | None = None) -> None:
         self.description = description
         self._estimated = description.root_state == "estimated"
-        self.window: tuple[int, ...] = (0, 1) if self._estimated else (1,)
+        self.window: tuple[int, ...] = (1,)
         self.control = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="sampled")
         self.sees_ahead = self.sees_travel = False
 
@@ -53,12 +53,12 @@ class _RegulatorFollower:
         step = seen.window[-1]
         targets = step.angles(self._hinge)
         if step.feedback is not None:
-            targets = targets + step.feedback(*self.state(seen))
+            targets = targets + self.correction(seen, step.feedback)
         return targets
 
-    def state(self, seen: TrackerInput) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states that the feedback is from."""
-        return seen.qpos, seen.qvel
+    def correction(self, seen: TrackerInput, feedback: StepCorrection) -> np.ndarray:
+        """Return the offsets of the targets by the feedback of a step, rad."""
+        return feedback(seen.qpos, seen.qvel)
 
 
 class _EstimatingFollower(_RegulatorFollower):
@@ -70,10 +70,9 @@ class _EstimatingFollower(_RegulatorFollower):
 
     def __init__(self, robot: Robot, dt: float) -> None:
         super().__init__(robot, dt)
-        self._odometry, self._feet = LegOdometry(robot, dt), Feet(robot)
+        self._odometry = LegOdometry(robot, dt)
 
-    def state(self, seen: TrackerInput) -> tuple[np.ndarray, np.ndarray]:
-        """Return the measured states, and of the root what is estimated, beside the feet."""
-        qpos, qvel = self._odometry.estimate(seen)
-        qpos[:, :2] -= self._feet.apart(qpos, self._feet.places(seen.window[0].qpos))
-        return qpos, qvel
+    def correction(self, seen: TrackerInput, feedback: StepCorrection) -> np.ndarray:
+        """Return the offsets by what is measured and, of the root, estimated, rad."""
+        state = self._odometry.estimate(seen.qpos, seen.qvel, seen.force, seen.window[-1])
+        return feedback(*state, beside_feet=True)

@@ -43,7 +43,7 @@ class TrackerDescription:
         file: Source of the network; null for `regulator`, which has none.
         root_state: Place and velocity of the root in the input of `regulator`: `exact`, as a
             simulation knows them, or `estimated` from the robot's own measurements
-            (`rl.trackers.leg_odometry`).
+            (`rl.sim.leg_odometry`).
         fallback: Whether to select it by default only if no other tracker of its robot is
             installed.
         homepage: Address of its authors' description.

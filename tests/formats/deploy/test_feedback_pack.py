@@ -147,7 +147,7 @@ def test_targets_are_those_of_the_tracker(made: Made) -> None:
 
 
 def test_the_runner_is_short_and_needs_two_packages(made: Made) -> None:
-    for name in ("run.py", "network_runner.py", "state_estimator.py"):
+    for name in ("run.py", "network_runner.py", "simulated_robot.py", "state_estimator.py"):
         text = (made.folder / name).read_text()
         assert len(text.splitlines()) <= 150
         assert "robojackson." not in text

@@ -112,10 +112,13 @@ def test_the_weights_that_a_training_began_with_are_listed(
 
 
 def test_what_the_runner_imports_is_listed_and_nothing_else(pack: Pack) -> None:
-    tree = ast.parse((pack.folder / "run.py").read_text())
+    own = sorted(pack.folder.glob("*.py"))
+    assert [path.name for path in own] == ["run.py", "simulated_robot.py"]
+    tree = ast.parse("".join(path.read_text() for path in own))
     names = {n.name for each in ast.walk(tree) if isinstance(each, ast.Import) for n in each.names}
     names |= {each.module for each in ast.walk(tree) if isinstance(each, ast.ImportFrom)}
     packages = {name.split(".")[0] for name in names if name} - sys.stdlib_module_names
+    packages -= {path.stem for path in own}
     assert packages == set(RUNNER_NEEDS)
     found = json.loads((pack.folder / "licences.json").read_text())["inputs"]
     software = {one["name"]: one["licence"] for one in found if one["kind"] == "software"}

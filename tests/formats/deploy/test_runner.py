@@ -34,6 +34,7 @@ import mujoco, numpy as np
 
 pack, starts, out = map(Path, sys.argv[1:])
 assert importlib.util.find_spec("robojackson") is None
+sys.path.insert(0, str(pack))
 spec = importlib.util.spec_from_file_location("run", pack / "run.py")
 run = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(run)
@@ -115,7 +116,10 @@ def test_the_runner_is_short_and_imports_three_packages(pack: Pack) -> None:
             names |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             names.add(str(node.module).split(".")[0])
-    assert names - sys.stdlib_module_names == set(NEEDED)
+    assert names - sys.stdlib_module_names == {*NEEDED, "simulated_robot"}
+    other = (pack.folder / "simulated_robot.py").read_text()
+    assert len(other.splitlines()) <= MOST_LINES
+    assert "robojackson" not in text + other.replace("robojackson export", "")
 
 
 @pytest.mark.slow
@@ -141,7 +145,10 @@ def test_the_figures_see_a_wrong_scale(pack: Pack, packages: Path, tmp_path: Pat
 def test_the_command_soft_starts_dances_and_damps(
     pack: Pack, packages: Path, tmp_path: Path
 ) -> None:
-    code = "import runpy\nsys.argv = sys.argv[1:]\nrunpy.run_path(sys.argv[0], run_name='__main__')"
+    code = (
+        f"import runpy\nsys.path.insert(0, {str(pack.folder)!r})\nsys.argv = sys.argv[1:]\n"
+        "runpy.run_path(sys.argv[0], run_name='__main__')"
+    )
     words = (str(pack.folder / "run.py"), "--seconds", "0.15", "--soft-start", "0.3")
     result = run_bare(packages, code, *words, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
@@ -154,16 +161,15 @@ def test_a_signal_stops_it_by_damping(
     pack: Pack, packages: Path, tmp_path: Path, name: str
 ) -> None:
     code = f"""
-import importlib.util, os, signal, threading
-spec = importlib.util.spec_from_file_location("run", sys.argv[1])
-run = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(run)
+import os, signal, threading
+sys.path.insert(0, sys.argv[1])
+import run
 driven, drive = [], run.SimulatedRobot.drive
 run.SimulatedRobot.drive = lambda *w: (driven.append(abs(w[2]).max()), drive(*w))
 threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.{name})).start()
 print(run.main(5.0, 2000.0, False), driven[0], max(driven[-100:]), len(driven))
 """
-    message_text = run_bare(packages, code, str(pack.folder / "run.py"), cwd=tmp_path)
+    message_text = run_bare(packages, code, str(pack.folder), cwd=tmp_path)
     assert message_text.returncode == 0, message_text.stderr
     words = message_text.stdout.split()
     assert message_text.stdout.startswith("danced 0.00 s, then damped: stopped by hand")

@@ -155,6 +155,28 @@ def test_a_policy_of_partial_observations_gets_no_feedback(kind: str) -> None:
     assert control_of(TrackConfig()).feedback is None
 
 
+def test_it_gets_the_feedback_of_an_estimated_root_where_that_is_asked_for() -> None:
+    estimated = ControlConfig(root_state="estimated")
+    config = TrackConfig(observation="onboard", control=estimated)
+    assert control_of(config) == estimated
+    assert control_of(TrackConfig(observation="onboard", control=FED)).root_state == "estimated"
+    exact = dataclasses.replace(FED, root_state="exact")
+    assert control_of(TrackConfig(observation="onboard", control=exact)) == exact
+    assert control_of(TrackConfig(control=FED)).root_state is None
+
+
+def test_a_policy_from_before_is_fed_with_the_exact_root(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    policy = random_policy(robot, sway)
+    law = dataclasses.asdict(FED)
+    del law["root_state"]
+    old = Policy(policy.layers, {**policy.facts, "control": law})
+    sim = Simulation(robot, policy_control(old, robot), 1)
+    assert sim.root_estimate is None
+    sim.close()
+
+
 def test_a_policy_from_before_has_none(robot: Robot, sway: ReferenceMotion) -> None:
     policy = random_policy(robot, sway)
     result = policy.facts["control"]

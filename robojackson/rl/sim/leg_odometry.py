@@ -13,11 +13,11 @@ World frame, metres, radians, seconds. The floor is at z = 0.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.rl.sim.accelerometer import swing_velocity
-from robojackson.rl.trackers.tracker import TrackerInput
+from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import point_jacobian, pose, tree
 
@@ -44,25 +44,38 @@ class LegOdometry:
     """Estimates of N robots, which begin at the place of their reference.
 
     The memory is replaced every step, never changed in place: a copy continues by itself.
+
+    Attributes:
+        now: The memory; None before the first estimate.
     """
 
     def __init__(self, robot: Robot, dt: float) -> None:
         self._soles, self._dt = _Soles(robot), dt
         self._gravity = np.array(robot.model.opt.gravity)
         self._imu = np.array(robot.description.imu)
-        self._now: RootState | None = None
+        self.now: RootState | None = None
 
     def estimate(
-        self, seen: TrackerInput
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        force: Float[np.ndarray, "N 3"] | None,
+        step: ClipStep,
+        begins: Bool[np.ndarray, " N"] | None = None,
     ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
         """Return the measured states with the estimates as place and velocity of the root.
 
         Args:
-            seen: Input of a tracker whose window ends with the next step; place and velocity of
-                its root are not read.
+            qpos, qvel: What is measured; place and velocity of the root are not read.
+            force: Specific force at the accelerometer, frame of the root, m/s^2; not read at the
+                beginning.
+            step: The next step of the reference.
+            begins: Robots that begin here; None for those that have no memory yet.
+
+        Raises:
+            ValueError: no force, for a robot that has begun before.
         """
-        step = seen.window[-1]
-        qpos, qvel = seen.qpos.copy(), seen.qvel.copy()
+        qpos, qvel = qpos.copy(), qvel.copy()
         qpos[:, :3] = qvel[:, :3] = 0.0
         points, speeds = self._soles.at(qpos, qvel)
         there, sliding = self._soles.at(step.qpos, step.qvel)
@@ -72,18 +85,21 @@ class LegOdometry:
         carried /= carried.sum(1, keepdims=True)
         measured = np.einsum("nc,nci->ni", carried, sliding - speeds)
         swing = swing_velocity(qpos, qvel, self._imu)
-        if self._now is None:
-            place = step.qpos[:, :3] - self._dt * step.qvel[:, :3]
-            velocity = _corrected(step.qvel[:, :3], measured, 1.0, DOUBT_M_S)
-        else:
-            if seen.force is None:
+        place = step.qpos[:, :3] - self._dt * step.qvel[:, :3]
+        velocity = _corrected(step.qvel[:, :3], measured, 1.0, DOUBT_M_S)
+        begun = np.zeros(len(qpos), bool) if self.now is None else np.ones(len(qpos), bool)
+        if begins is not None:
+            begun &= ~begins
+        if self.now is not None and begun.any():
+            if force is None:
                 raise ValueError("leg odometry needs the accelerometer")
-            turned = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), seen.force)
-            predicted = self._now.imu_velocity + self._dt * (turned + self._gravity) - swing
-            velocity = _corrected(predicted, measured, SHARE, DOUBT_M_S)
-            place = self._now.place + self._dt * velocity
+            turned = np.einsum("nij,nj->ni", quat_to_matrix(qpos[:, 3:7]), force)
+            predicted = self.now.imu_velocity + self._dt * (turned + self._gravity) - swing
+            later = _corrected(predicted, measured, SHARE, DOUBT_M_S)
+            velocity = np.where(begun[:, None], later, velocity)
+            place = np.where(begun[:, None], self.now.place + self._dt * later, place)
         place[:, 2:] = _corrected(place[:, 2:], -lowest[:, None], SHARE, DOUBT_M)
-        self._now = RootState(place, velocity, velocity + swing)
+        self.now = RootState(place, velocity, velocity + swing)
         qpos[:, :3], qvel[:, :3] = place, velocity
         return qpos, qvel
 

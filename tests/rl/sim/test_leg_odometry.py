@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,11 +14,10 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.sim.accelerometer import NOISE_M_S2, Accelerometer, swing_velocity
+from robojackson.rl.sim.leg_odometry import LegOdometry
 from robojackson.rl.sim.reference_clip import Clip, ClipStep
 from robojackson.rl.sim.simulation import Simulation
-from robojackson.rl.trackers.leg_odometry import LegOdometry
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
-from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
 from robojackson.robot.model import Robot
 from tests.fixtures.robots import robot_motion
@@ -29,21 +29,30 @@ EXACT = TrackerDescription(
 )  # fmt: skip
 
 
-def measured(motion: ReferenceMotion, i: int, clip: Clip) -> TrackerInput:
+class Measured(NamedTuple):
+    """Arguments of `LegOdometry.estimate`."""
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    force: np.ndarray
+    step: ClipStep
+
+
+def measured(motion: ReferenceMotion, i: int, clip: Clip) -> Measured:
     """Return what a robot measures that follows a motion exactly; not a number where it cannot."""
     qpos, qvel = motion.qpos[i : i + 1].copy(), motion.qvel[i : i + 1].copy()
     change = (motion.qvel[i, :3] - motion.qvel[max(i - 1, 0), :3]) / motion.dt - G
     force = change[None] @ quat_to_matrix(qpos[:, 3:7])[0]
     qpos[:, :3] = qvel[:, :3] = np.nan
     step: ClipStep = clip.at(np.array([i]))
-    return TrackerInput(qpos, qvel, np.full((1, 14, 3), np.nan), (step,), force)
+    return Measured(qpos, qvel, force, step)
 
 
 def test_a_motion_with_steps_is_followed_to_centimetres_without_its_root(robot: Robot) -> None:
     motion = robot_motion("dance_b")
     clip, odometry, off, place = Clip(motion), LegOdometry(robot, motion.dt), [], np.zeros(3)
     for i in range(len(motion)):
-        qpos, qvel = odometry.estimate(measured(motion, i, clip))
+        qpos, qvel = odometry.estimate(*measured(motion, i, clip))
         place = qpos[0, :3] - motion.qpos[i, :3]
         off.append(np.linalg.norm(qvel[0, :3] - motion.qvel[i, :3]))
     assert np.median(off) < 0.05
@@ -54,11 +63,10 @@ def test_a_push_is_noticed_though_the_soles_rest(robot: Robot, sway: ReferenceMo
     clip, odometry = Clip(sway), LegOdometry(robot, sway.dt)
     quiet = [measured(sway, 0, clip)] * 3
     for seen in quiet:
-        _, qvel = odometry.estimate(seen)
+        _, qvel = odometry.estimate(*seen)
     before = qvel[0, :3]
-    assert quiet[0].force is not None
-    pushed = replace(quiet[0], force=quiet[0].force + [1.0 / sway.dt, 0.0, 0.0])
-    _, qvel = odometry.estimate(pushed)
+    pushed = quiet[0]._replace(force=quiet[0].force + [1.0 / sway.dt, 0.0, 0.0])
+    _, qvel = odometry.estimate(*pushed)
     assert 0.9 < np.linalg.norm(qvel[0, :3] - before) < 1.1
 
 
@@ -76,9 +84,8 @@ def test_an_accelerometer_beside_the_root_tells_the_same(robot: Robot) -> None:
         odometry, states = LegOdometry(machine, motion.dt), []
         for i in range(80):
             seen = measured(motion, i, clip)
-            assert seen.force is not None
-            seen = replace(seen, force=seen.force + more * felt[i])
-            states.append(np.concatenate([each[0, :3] for each in odometry.estimate(seen)]))
+            seen = seen._replace(force=seen.force + more * felt[i])
+            states.append(np.concatenate([each[0, :3] for each in odometry.estimate(*seen)]))
         off[name] = np.array(states)
     np.testing.assert_allclose(off["beside"], off["root"], atol=1e-9)
     assert np.abs(off["wrong"] - off["root"]).max() > 0.01
@@ -86,14 +93,14 @@ def test_an_accelerometer_beside_the_root_tells_the_same(robot: Robot) -> None:
 
 def test_a_copy_continues_by_itself(robot: Robot, sway: ReferenceMotion) -> None:
     clip, first = Clip(sway), LegOdometry(robot, sway.dt)
-    first.estimate(measured(sway, 0, clip))
+    first.estimate(*measured(sway, 0, clip))
     second = copy.copy(first)
     for i in range(1, 5):
-        first.estimate(measured(sway, i, clip))
-    again, _ = second.estimate(measured(sway, 1, clip))
+        first.estimate(*measured(sway, i, clip))
+    again, _ = second.estimate(*measured(sway, 1, clip))
     fresh = LegOdometry(robot, sway.dt)
-    fresh.estimate(measured(sway, 0, clip))
-    np.testing.assert_array_equal(again, fresh.estimate(measured(sway, 1, clip))[0])
+    fresh.estimate(*measured(sway, 0, clip))
+    np.testing.assert_array_equal(again, fresh.estimate(*measured(sway, 1, clip))[0])
 
 
 def test_the_accelerometer_shows_the_opposite_of_gravity_at_rest_and_nothing_in_a_fall(

@@ -1,0 +1,88 @@
+"""The state of simulated robots as they know it themselves, from one control step to the next.
+
+World frame, metres, radians, seconds.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from robojackson.rl.sim.accelerometer import Accelerometer, Moving
+from robojackson.rl.sim.leg_odometry import LegOdometry, RootState
+from robojackson.rl.sim.reference_clip import ClipStep
+from robojackson.robot.model import Robot
+
+PARTS = ("place", "velocity", "imu_velocity")
+
+
+class RootEstimate:
+    """Sensors of N robots, and what leg odometry makes of them.
+
+    A robot's odometry begins when it is placed. In a control step it is asked for once; a second
+    answer is the first.
+    """
+
+    def __init__(self, robot: Robot, sim: Moving, n: int) -> None:
+        self._accelerometer = Accelerometer(sim, robot.description.imu)
+        self._odometry = LegOdometry(robot, sim.dt)
+        self._begins, self._answered = np.ones(n, bool), np.zeros(n, bool)
+        self._answer = np.zeros((n, robot.model.nq)), np.zeros((n, robot.model.nv))
+
+    def begin(self, rows: Int[np.ndarray, " I"]) -> None:
+        """Forget what some robots did before: they have been placed."""
+        self._accelerometer.begin(rows)
+        self._begins[rows], self._answered[rows] = True, False
+
+    def after_step(self) -> None:
+        """Look at the sensors anew when asked next."""
+        self._answered[:] = False
+
+    def of(
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        step: ClipStep,
+        noise: Float[np.ndarray, "N 3"],
+    ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return the states with the estimates of the root's place and velocity.
+
+        Args:
+            qpos, qvel: As the sensors measure them; place and velocity of the root are not read.
+            step: The next step of the reference.
+            noise: Of the accelerometers (`Accelerometer.read`).
+        """
+        asked = ~self._answered
+        if asked.any():
+            before = self._odometry.now
+            force = None if before is None else self._accelerometer.read(noise)
+            found = self._odometry.estimate(qpos, qvel, force, step, self._begins)
+            qpos, qvel = (
+                np.where(asked[:, None], new, old)
+                for new, old in zip(found, self._answer, strict=True)
+            )
+            self._answer = qpos, qvel
+            self._keep(before, asked)
+            self._begins[:], self._answered[:] = False, True
+        return self._answer
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return the memory between two control steps, as arrays."""
+        now = self._odometry.now
+        size = (len(self._begins), 3)
+        parts = {part: np.zeros(size) if now is None else getattr(now, part) for part in PARTS}
+        felt = {"felt": self._accelerometer.velocity, "begins": self._begins}
+        return {f"root_{name}": array.copy() for name, array in (parts | felt).items()}
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Restore the memory from `state`."""
+        self._odometry.now = RootState(*(np.array(state[f"root_{part}"]) for part in PARTS))
+        self._accelerometer.velocity = np.array(state["root_felt"])
+        self._begins = np.array(state["root_begins"])
+        self._answered[:] = False
+
+    def _keep(self, before: RootState | None, asked: np.ndarray) -> None:
+        """Leave the memory of robots that had been asked for already as it was."""
+        now = self._odometry.now
+        if before is None or now is None or asked.all():
+            return
+        parts = ((getattr(now, part), getattr(before, part)) for part in PARTS)
+        self._odometry.now = RootState(*(np.where(asked[:, None], new, old) for new, old in parts))
