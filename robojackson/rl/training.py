@@ -37,6 +37,9 @@ log = logging.getLogger(__name__)
 POLISHED = ENOUGH
 """Share of the starts from which the feedback alone holds a motion that repeats, for it to be
 polished; where a path holds so many, no better one is searched."""
+ESTIMATED_PENALTY = 0.03
+"""Cost of actions of a polish on feedback from an estimated root, which alone holds less: a policy
+has more to correct (docs/learning_g1.md, "On its own measurements")."""
 
 
 def train_policy(
@@ -116,7 +119,10 @@ def residual_learning(
     if not polishes(config, robot, reference, held):
         return config.tqc
     log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
-    return replace(config.tqc, **PRESETS["polish"])
+    polish = replace(config.tqc, **PRESETS["polish"])
+    if control_of(config.track).root_state == "estimated":
+        return replace(polish, action_penalty=ESTIMATED_PENALTY)
+    return polish
 
 
 def polishes(

@@ -54,8 +54,8 @@ def test_what_the_feedback_holds_is_polished(fed: Robot, sway: ReferenceMotion) 
         {"start": "walker"},
         {"mode": "paper"},
         {"tqc.preset": "released"},
-        {"track.observation": "onboard"},
         {"track.control.feedback": 0.0},
+        {"track.observation": "preview"},
         {"track.control.feedback_path": "reference"},
         {"track.random.pushes": 1.0},
     ],
@@ -65,6 +65,18 @@ def test_other_trainings_are_not(
     fed: Robot, sway: ReferenceMotion, named: Mapping[str, object]
 ) -> None:
     assert not polishes(configured(**named), fed, replace(sway, cyclic=False), 1.0)
+
+
+def test_a_policy_of_own_measurements_is_polished_on_the_estimated_root(
+    fed: Robot, sway: ReferenceMotion
+) -> None:
+    onboard = configured(**{"track.observation": "onboard"})
+    ending = replace(sway, cyclic=False)
+    assert polishes(onboard, fed, ending, 0.5)
+    by_exact_root = residual_learning(configured(), fed, ending, 0.5)
+    estimated = residual_learning(onboard, fed, ending, 0.5)
+    assert 0 < estimated.action_penalty < by_exact_root.action_penalty
+    assert replace(estimated, action_penalty=by_exact_root.action_penalty) == by_exact_root
 
 
 def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:

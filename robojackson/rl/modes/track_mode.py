@@ -151,12 +151,12 @@ class TrackMode:
 
 
 def control_of(config: TrackConfig) -> ControlConfig:
-    """Return the control law of a training: without the full state, feedback is only where it is
-    asked for, and from an estimate of the root unless that is told otherwise."""
+    """Return the control law of a training: with a robot's own measurements the feedback is from an
+    estimate of the root, unless it is set otherwise; a policy of many motions has none."""
     control = config.control
     if config.observation in ("full", "full_preview"):
         return control
-    if control.feedback is None and control.root_state is None:
+    if config.observation == "preview" and control.feedback is None:
         return replace(control, feedback=0.0)
     return replace(control, root_state=control.root_state or "estimated")
 

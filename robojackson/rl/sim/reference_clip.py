@@ -7,56 +7,17 @@ offsets. A motion that is not cyclic holds its last step. Step s of the m-th mot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.errors import RejectedReference, TrackTooShort
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
+from robojackson.rl.sim.step_law import Law, StepCorrection
 
 LEAST_STEPS = 8
 STRIDE = 1_000_000
 """Distance in steps between the motions of a clip; no episode is as long."""
-
-
-class StepLaw(Protocol):
-    """Offsets of the targets of N robots at one step of their references."""
-
-    def targets(
-        self,
-        qpos: Float[np.ndarray, "N nq"],
-        qvel: Float[np.ndarray, "N nv"],
-        beside_feet: bool = False,
-    ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad.
-
-        Args:
-            beside_feet: Whether to follow the motion from where the feet of each robot stand.
-        """
-
-
-class StepCorrection(Protocol):
-    """Offsets of the targets on the way to one step."""
-
-    def __call__(
-        self,
-        qpos: Float[np.ndarray, "N nq"],
-        qvel: Float[np.ndarray, "N nv"],
-        beside_feet: bool = False,
-    ) -> Float[np.ndarray, "N nu"]:
-        """Return `StepLaw.targets`."""
-
-
-class Law(Protocol):
-    """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
-
-    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
-        """Return the feedback at rows whose cycles have moved them by `shift`, m."""
-
-    @property
-    def held(self) -> float:
-        """Share of the time that it keeps robots upright by itself, 0..1; NaN where unknown."""
 
 
 @dataclass(frozen=True)

@@ -17,24 +17,24 @@ PARTS = ("place", "velocity", "imu_velocity")
 class RootEstimate:
     """Sensors of N robots, and what leg odometry makes of them.
 
-    A robot's odometry begins when it is placed. In a control step it is asked for once; a second
-    answer is the first.
+    A robot's odometry begins when it is placed. Within a control step the estimate is computed
+    once.
     """
 
     def __init__(self, robot: Robot, sim: Moving, n: int) -> None:
         self._accelerometer = Accelerometer(sim, robot.description.imu)
         self._odometry = LegOdometry(robot, sim.dt)
-        self._begins, self._answered = np.ones(n, bool), np.zeros(n, bool)
-        self._answer = np.zeros((n, robot.model.nq)), np.zeros((n, robot.model.nv))
+        self._begins, self._current = np.ones(n, bool), np.zeros(n, bool)
+        self._estimate = np.zeros((n, robot.model.nq)), np.zeros((n, robot.model.nv))
 
     def begin(self, rows: Int[np.ndarray, " I"]) -> None:
         """Forget what some robots did before: they have been placed."""
         self._accelerometer.begin(rows)
-        self._begins[rows], self._answered[rows] = True, False
+        self._begins[rows], self._current[rows] = True, False
 
     def after_step(self) -> None:
-        """Look at the sensors anew when asked next."""
-        self._answered[:] = False
+        """Read the sensors again at the next request."""
+        self._current[:] = False
 
     def of(
         self,
@@ -50,19 +50,19 @@ class RootEstimate:
             step: The next step of the reference.
             noise: Of the accelerometers (`Accelerometer.read`).
         """
-        asked = ~self._answered
-        if asked.any():
+        stale = ~self._current
+        if stale.any():
             before = self._odometry.now
             force = None if before is None else self._accelerometer.read(noise)
             found = self._odometry.estimate(qpos, qvel, force, step, self._begins)
             qpos, qvel = (
-                np.where(asked[:, None], new, old)
-                for new, old in zip(found, self._answer, strict=True)
+                np.where(stale[:, None], new, old)
+                for new, old in zip(found, self._estimate, strict=True)
             )
-            self._answer = qpos, qvel
-            self._keep(before, asked)
-            self._begins[:], self._answered[:] = False, True
-        return self._answer
+            self._estimate = qpos, qvel
+            self._keep(before, stale)
+            self._begins[:], self._current[:] = False, True
+        return self._estimate
 
     def state(self) -> dict[str, np.ndarray]:
         """Return the memory between two control steps, as arrays."""
@@ -77,12 +77,12 @@ class RootEstimate:
         self._odometry.now = RootState(*(np.array(state[f"root_{part}"]) for part in PARTS))
         self._accelerometer.velocity = np.array(state["root_felt"])
         self._begins = np.array(state["root_begins"])
-        self._answered[:] = False
+        self._current[:] = False
 
-    def _keep(self, before: RootState | None, asked: np.ndarray) -> None:
-        """Leave the memory of robots that had been asked for already as it was."""
+    def _keep(self, before: RootState | None, stale: np.ndarray) -> None:
+        """Restore the memory of robots whose estimate is of this control step already."""
         now = self._odometry.now
-        if before is None or now is None or asked.all():
+        if before is None or now is None or stale.all():
             return
         parts = ((getattr(now, part), getattr(before, part)) for part in PARTS)
-        self._odometry.now = RootState(*(np.where(asked[:, None], new, old) for new, old in parts))
+        self._odometry.now = RootState(*(np.where(stale[:, None], new, old) for new, old in parts))

@@ -30,9 +30,10 @@ from robojackson.rl.sim.motors import (
     gains,
     residual_scale,
 )
-from robojackson.rl.sim.reference_clip import ClipStep, StepCorrection
+from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.robot_batch import SIZE, Batch, Views, centre_of_mass, without_sensors
 from robojackson.rl.sim.root_estimate import RootEstimate
+from robojackson.rl.sim.step_law import StepCorrection
 from robojackson.rl.sim.variation import varied_models
 from robojackson.robot.model import Robot
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.leg_odometry import LegOdometry
 from robojackson.rl.sim.motors import Motors
-from robojackson.rl.sim.reference_clip import StepCorrection
+from robojackson.rl.sim.step_law import StepCorrection
 from robojackson.rl.trackers.equipment import require_robot
 from robojackson.rl.trackers.tracker import Follower, TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
