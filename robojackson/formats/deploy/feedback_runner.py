@@ -46,6 +46,7 @@ class Runner(NetworkRunner):
     """The feedback and its motion, in the frame of the motion; refuses parts that do not fit."""
 
     machine = ImuRobot
+    files: tuple[str, ...] = ("deploy.yaml", "robot.xml", "feedback.npz")
 
     def load(self, folder: Path) -> None:
         """Load gains and motion."""

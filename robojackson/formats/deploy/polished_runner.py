@@ -19,6 +19,8 @@ PARSER.description = __doc__
 class Runner(FeedbackRunner):
     """The network, the feedback and their motion; refuses parts that do not fit."""
 
+    files = (*FeedbackRunner.files, "policy.onnx", "motion.npz")
+
     def load(self, folder: Path) -> None:
         """Load all three."""
         NetworkRunner.load(self, folder)

@@ -34,8 +34,12 @@ class Runner:
     """The policy and its motion on a robot; refuses a pack whose parts do not fit each other."""
 
     machine: Any = SimulatedRobot
+    files: tuple[str, ...] = ("deploy.yaml", "robot.xml", "policy.onnx", "motion.npz")
 
     def __init__(self, folder: Path = Path(__file__).parent, robot: Any = None) -> None:
+        missing = [name for name in self.files if not (folder / name).is_file()]
+        if missing:
+            raise SystemExit(f"refused: {', '.join(missing)} missing in {folder}")
         self.cfg = cfg = settings(folder)
         self.model = mujoco.MjModel.from_xml_path(str(folder / "robot.xml"))
         self.pose = mujoco.MjData(self.model)

@@ -126,6 +126,14 @@ print(run.main(0.15, 0.3, False, run.Runner))
     assert result.stdout.startswith("danced 0.15 s")
 
 
+@pytest.mark.parametrize("name", ["deploy.yaml", "robot.xml", "feedback.npz", "policy.onnx"])
+def test_a_pack_without_one_of_its_files_is_refused(made: Made, name: str, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(made.folder, tmp_path / "pack"))
+    (folder / name).unlink()
+    with pytest.raises(SystemExit, match=f"refused: {name} missing in"):
+        Runner(folder)
+
+
 @pytest.mark.parametrize("harm", ["feedback", "layout"])
 def test_parts_of_other_packs_are_refused(made: Made, harm: str, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(made.folder, tmp_path / "pack"))

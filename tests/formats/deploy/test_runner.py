@@ -177,6 +177,14 @@ print(run.main(5.0, 2000.0, False), driven[0], max(driven[-100:]), len(driven))
     assert int(words[-1]) < 100_000, "of 133,333: it did not wait for the end"
 
 
+def test_a_pack_that_was_copied_in_part_is_refused(pack: Pack, tmp_path: Path) -> None:
+    other = copied(pack, tmp_path)
+    for name in ("motion.npz", "policy.onnx"):
+        (other / name).unlink()
+    with pytest.raises(SystemExit, match=r"refused: policy\.onnx, motion\.npz missing in"):
+        Runner(other)
+
+
 def test_a_layout_with_another_hash_is_refused(pack: Pack, tmp_path: Path) -> None:
     size = 9 + 5 * len(pack.robot.joint_names)
     other = with_setting(copied(pack, tmp_path), "layout", ["0" * 64, size])
