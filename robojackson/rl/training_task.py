@@ -41,10 +41,19 @@ class Task:
 
     def completing(self, configuration: Mapping[str, object]) -> dict[str, object]:
         """Return the configuration of a checkpoint that lacks what older ones did not keep."""
-        task, tqc = configuration["task"], configuration["tqc"]
-        if not (isinstance(task, dict) and isinstance(tqc, dict)):
+        parts = [configuration.get(name) for name in ("task", "tqc", "track")]
+        task, tqc, track = (part if isinstance(part, dict) else {} for part in parts)
+        if not (task and tqc and track):
             return {}
-        return {**configuration, "task": {**asdict(self), **task}, "tqc": {**OLDER_TQC, **tqc}}
+        # An older training with a robot's own measurements had the exact root or no feedback.
+        known = None if track.get("observation") == "full" else "exact"
+        control = {"root_state": known, **track["control"]}
+        return {
+            **configuration,
+            "task": {**asdict(self), **task},
+            "tqc": {**OLDER_TQC, **tqc},
+            "track": {**track, "control": control},
+        }
 
 
 @dataclass(frozen=True)

@@ -251,6 +251,25 @@ def test_a_checkpoint_from_before_returns_over_several_steps_is_continued_with_o
 
 
 @pytest.mark.medium
+def test_a_checkpoint_from_before_roots_were_estimated_is_continued_where_none_is(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    for kind, continues in (("full", True), ("onboard", False)):
+        track = dataclasses.replace(brief("sbx").track, observation=kind)
+        config, out = dataclasses.replace(brief("sbx"), track=track), tmp_path / kind
+        run(robot, sway, config, out)
+        (kept,) = out.glob("checkpoint*/run.json")
+        state = json.loads(kept.read_text())
+        del state["configuration"]["track"]["control"]["root_state"]
+        kept.write_text(json.dumps(state))
+        if continues:
+            assert run(robot, sway, config, out).steps == state["steps"]
+        else:
+            with pytest.raises(BadConfiguration, match="another configuration"):
+                run(robot, sway, config, out)
+
+
+@pytest.mark.medium
 @pytest.mark.parametrize("part", ["run.json", "networks.*", "environment.npz"])
 def test_a_damaged_checkpoint_is_refused_by_its_name(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path, part: str
