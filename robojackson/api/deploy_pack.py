@@ -149,7 +149,7 @@ def _require_onboard(policy: Policy) -> None:
     """Refuse what a real robot cannot run.
 
     Raises:
-        BadPolicy: another mode, observation or law, or feedback of the full state.
+        BadPolicy: another mode, observation or law, or feedback from the exact root.
     """
     held = policy.facts.get("control")
     law: Mapping[str, object] = held if isinstance(held, Mapping) else {}

@@ -197,12 +197,23 @@ def evaluate(
     if tracker is not None:
         estimated = tracker.description.root_state == "estimated"
         following = pack_of(policy, reference, out) if estimated else train_this(reference)
+    elif summary["verdict"]["kind"] == "dances" and is_fed_onboard(policy):
+        following = pack_of(policy, reference, out)
     elif summary["verdict"]["kind"] == "dances":
         words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
         following = cards.command_line(*words)
     else:
         following = train_after(policy, reference, LONGER_MINUTES)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
+
+
+def is_fed_onboard(policy: Path) -> bool:
+    """Return whether a policy needs feedback from an estimated root, which other files than a
+    deploy pack do not have."""
+    from robojackson.rl.policy import load_policy
+
+    law = load_policy(policy).facts.get("control")
+    return isinstance(law, Mapping) and law.get("root_state") == "estimated"
 
 
 def is_tracker(policy: Path) -> bool:

@@ -65,6 +65,8 @@ def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
     control = fact(policy, "control", ControlConfig)
     if control.feedback is None:  # trained before the feedback existed
         control = replace(control, feedback=0.0)
+    if control.root_state is None:  # trained before it could be estimated
+        control = replace(control, root_state="exact")
     if control.feedback_path is None:  # trained before there was a choice
         control = replace(control, feedback_path="reference")
     if control.action_factor is None:  # trained before there was one: pushes must not change it

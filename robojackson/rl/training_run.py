@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from robojackson.errors import BadConfiguration, TrainingDiverged
+from robojackson.errors import TrainingDiverged
 from robojackson.rl import checkpoint_folder
 from robojackson.rl.checkpoint_folder import newest_checkpoint, set_results_aside, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
+from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
 from robojackson.rl.tensorboard_log import ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
@@ -68,11 +69,7 @@ class Run:
             return
         with checkpoint_folder.restoring(folder):
             state = json.loads((folder / "run.json").read_text())
-            if self.task.completing(state["configuration"]) != self._identity():
-                raise BadConfiguration(
-                    f"{folder} belongs to another configuration, reference motion or robot; "
-                    "remove it or choose another folder"
-                )
+            self.task.require_same(state["configuration"], self._identity(), folder)
             trainer.load(folder, self._replay, state["steps"], state["updates"])
             with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
                 self.core.restore(dict(arrays))
@@ -151,6 +148,7 @@ class Run:
     def _identity(self) -> dict[str, object]:
         """Return the configuration without the budget, which a continued run must share."""
         fields = asdict(self.config)
+        fields["track"]["control"] = asdict(control_of(self.config.track))
         for free in NOT_OF_THE_RUN:
             del fields[free]
         result: dict[str, object] = json.loads(json.dumps(fields | {"task": asdict(self.task)}))

@@ -1,16 +1,21 @@
 """The task of a training run, and its result."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
+from robojackson.errors import BadConfiguration
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of, poses_sha256
 from robojackson.robot.description import description_sha256
 from robojackson.robot.model import Robot
 
 OLDER_TQC = {"n_steps": 1}
 """Numbers of TQC from before they could be chosen."""
+SHOWN = 4
+"""Differences that a message names at most."""
 
 
 @dataclass(frozen=True)
@@ -22,12 +27,14 @@ class Task:
         model_sha256: Digest of its MJCF.
         reference_sha256: Digest of the reference's poses; of several, the digest of their digests.
         description_sha256: Digest of the robot's YAML: gains, limits, friction, rules.
+        imu: Place of its accelerometer in the frame of the root, m.
     """
 
     robot: str
     model_sha256: str
     reference_sha256: str
     description_sha256: str
+    imu: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @staticmethod
     def of(reference: ReferenceMotion | Sequence[ReferenceMotion], robot: Robot) -> "Task":
@@ -36,24 +43,69 @@ class Task:
         joined = hashlib.sha256("".join(digests).encode()).hexdigest()
         found = digests[0] if len(digests) == 1 else joined
         return Task(
-            robot.description.name, robot.sha256, found, description_sha256(robot.description)
+            robot.description.name,
+            robot.sha256,
+            found,
+            description_sha256(robot.description),
+            tuple(robot.description.imu),
         )
 
-    def completing(self, configuration: Mapping[str, object]) -> dict[str, object]:
-        """Return the configuration of a checkpoint that lacks what older ones did not keep."""
-        parts = [configuration.get(name) for name in ("task", "tqc", "track")]
+    def require_same(
+        self, kept: Mapping[str, object], now: Mapping[str, object], folder: Path
+    ) -> None:
+        """Raise for a checkpoint that another training wrote.
+
+        Args:
+            kept: Configuration of the checkpoint.
+            now: That of the training that would continue it.
+            folder: The checkpoint.
+
+        Raises:
+            BadConfiguration: the message names what differs.
+        """
+        apart = list(_differences(self._completed(kept), now))
+        if apart:
+            raise BadConfiguration(
+                f"{folder} belongs to another configuration, reference motion or robot "
+                f"({'; '.join(apart[:SHOWN])}); remove it or choose another folder"
+            )
+
+    def _completed(self, kept: Mapping[str, object]) -> dict[str, object]:
+        """Return the configuration of a checkpoint with what older ones did not keep."""
+        parts = [kept.get(name) for name in ("task", "tqc", "track")]
         task, tqc, track = (part if isinstance(part, dict) else {} for part in parts)
         if not (task and tqc and track):
             return {}
-        # An older training with a robot's own measurements had the exact root or no feedback.
-        known = None if track.get("observation") == "full" else "exact"
-        control = {"root_state": known, **track["control"]}
         return {
-            **configuration,
-            "task": {**asdict(self), **task},
+            **kept,
+            "task": {**json.loads(json.dumps(asdict(self))), **task},
             "tqc": {**OLDER_TQC, **tqc},
-            "track": {**track, "control": control},
+            "track": {**track, "control": _older_control(track)},
         }
+
+
+def _older_control(track: Mapping[str, Any]) -> dict[str, object]:
+    """Return the control law of a checkpoint; where it is from before roots were estimated, that of
+    then: policies that do not see the full state had no feedback unless it was set."""
+    control: dict[str, object] = dict(track["control"])
+    if "root_state" in control:
+        return control
+    full = track.get("observation") == "full"
+    if control.get("feedback") is None and not full:
+        control["feedback"] = 0.0
+    measured = track.get("observation") in ("onboard", "preview")
+    exact = measured and control.get("feedback") != 0
+    return {**control, "root_state": "exact" if exact else None}
+
+
+def _differences(kept: object, now: object, name: str = "") -> Iterator[str]:
+    """Yield the keys at which two configurations differ, with both values."""
+    if isinstance(kept, Mapping) and isinstance(now, Mapping):
+        for key in sorted({*kept, *now}):
+            inner = f"{name}.{key}" if name else str(key)
+            yield from _differences(kept.get(key), now.get(key), inner)
+    elif kept != now:
+        yield f"{name}: {json.dumps(kept)} there, {json.dumps(now)} here"
 
 
 @dataclass(frozen=True)

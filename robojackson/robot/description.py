@@ -169,7 +169,8 @@ class RobotDescription:
         feedforward: Share of the torques that a reference needs by which the targets of the PD
             law lead its joint angles, unitless.
         feedback: Share of the linear-quadratic feedback along a reference by which the targets of
-            the PD law move, for policies that see all, unitless.
+            the PD law move, unitless; policies of a robot's own measurements get it from an
+            estimate of its root.
         feedback_path: What the feedback keeps the robot on: the `reference`, or, where that falls,
             a path beside it that is `sampled` by simulations.
         imu: Place of the accelerometer in the frame of the root body, metres.

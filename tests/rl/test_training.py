@@ -260,13 +260,17 @@ def test_a_checkpoint_from_before_roots_were_estimated_is_continued_where_none_i
         run(robot, sway, config, out)
         (kept,) = out.glob("checkpoint*/run.json")
         state = json.loads(kept.read_text())
-        del state["configuration"]["track"]["control"]["root_state"]
+        old = state["configuration"]["track"]["control"]
+        del old["root_state"]
         kept.write_text(json.dumps(state))
         if continues:
             assert run(robot, sway, config, out).steps == state["steps"]
         else:
-            with pytest.raises(BadConfiguration, match="another configuration"):
+            with pytest.raises(BadConfiguration, match=r"control\.feedback: 0\.0 there, null here"):
                 run(robot, sway, config, out)
+            control = dataclasses.replace(track.control, feedback=0.0)
+            then = dataclasses.replace(config, track=dataclasses.replace(track, control=control))
+            assert run(robot, sway, then, out).steps == state["steps"]
 
 
 @pytest.mark.medium

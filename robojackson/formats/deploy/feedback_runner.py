@@ -50,6 +50,8 @@ class Runner(NetworkRunner):
 
     def load(self, folder: Path) -> None:
         """Load gains and motion."""
+        if not callable(getattr(self.robot, "force", None)):
+            raise SystemExit("refused: the robot has no force(), which is its accelerometer")
         self.robot.imu = np.array(self.cfg["imu"])
         if (
             hashlib.sha256((folder / "feedback.npz").read_bytes()).hexdigest()

@@ -18,10 +18,10 @@ FILES = """\
 |---|---|
 | `run.py` | runs it: `pip install numpy onnxruntime mujoco`, `python run.py --view` |
 | `policy.onnx` | `obs`, `time_step` in; `actions` and the motion out, as mjlab exports |
-| `simulated_robot.py` | the robot that it drives, in MuJoCo |
 | `policy_obs.onnx` | the same function, `obs` in, `actions` out, for Unitree's C++ runner |
 | `motion.npz` | the motion for mjlab; the command of a control step is one row ahead |
 | `deploy.yaml` | joint order, gains, limits, scale, layout; Unitree's keys first |
+| `simulated_robot.py` | the robot that it drives, in MuJoCo |
 """
 FEEDBACK_FILES = """\
 | file | what |

@@ -130,11 +130,13 @@ def main(seconds: float, soft_start: float, view: bool, kind: type[Runner] = Run
             robot.drive(goal, min(1.0, 2 * share) * runner.kp, runner.kd)
     robot.hung, steps = None, 0
     runner.begin(0)
-    while not stop and steps < round(seconds / dt):
-        stop += filter(None, [runner.step()])
-        steps += 1
-    for _ in range(round(2.0 / dt)):  # no stiffness: the joints only brake
-        robot.drive(runner.default, 0.0 * runner.kp, runner.kd)
+    try:
+        while not stop and steps < round(seconds / dt):
+            stop += filter(None, [runner.step()])
+            steps += 1
+    finally:
+        for _ in range(round(2.0 / dt)):  # no stiffness: the joints only brake
+            robot.drive(runner.default, 0.0 * runner.kp, runner.kd)
     return f"danced {steps * dt:.2f} s, then damped: {(*stop, 'the end')[0]}"
 
 

@@ -1,4 +1,4 @@
-"""State of a robot from its own measurements: a part of a deploy pack without a network.
+"""State of a robot from its own measurements: a part of a deploy pack with feedback.
 
 Place and velocity of the root follow from the soles that carry it, which rest or slide as the
 motion's, and from the accelerometer. All in the frame of the motion; m, rad, s.

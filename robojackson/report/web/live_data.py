@@ -45,8 +45,7 @@ def live_data(
     """Return the data of a live dance; None where a browser cannot run it.
 
     A browser cannot run a policy of the paper's mode, feedback from an estimated root, a tracker
-    whose network is a file of another
-    project, or a robot whose meshes collide.
+    whose network is a file of another project, or a robot whose meshes collide.
     """
     if not runs_in_a_browser(policy):
         return None
@@ -104,7 +103,8 @@ def runs_in_a_browser(policy: Evaluated) -> bool:
     if isinstance(policy, Policy):
         held = policy.facts.get("control")
         law = held if isinstance(held, Mapping) else {}
-        return mode_of(policy) == "track" and law.get("root_state") != "estimated"
+        estimates = law.get("feedback") and law.get("root_state") == "estimated"
+        return mode_of(policy) == "track" and not estimates
     if isinstance(policy, RegulatorTracker):
         return policy.description.root_state == "exact"
     return isinstance(policy, PolicyTracker)

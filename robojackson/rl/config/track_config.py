@@ -26,7 +26,7 @@ class ControlConfig:
             unitless; 0 follows the angles alone; the robot's when null.
         feedback: Share of the linear-quadratic feedback along the reference by which the targets
             move, unitless; 0 leaves balance to the policy alone; when null the robot's, or 0 for
-            `preview`.
+            `preview` and `full_preview`.
         root_state: Place and velocity of the root in the feedback: `exact`, as a simulation knows
             them, or `estimated` from a robot's own measurements (`rl.sim.leg_odometry`); when null
             as the policy sees them: `exact`, or `estimated` for `onboard` and `preview`.

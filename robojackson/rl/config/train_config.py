@@ -53,8 +53,9 @@ class TrainConfig:
         polish: Whether the training starts from what the feedback alone does and improves it
             (preset `polish` of TQC). `auto`: from scratch, on a robot whose feedback follows a
             sampled path (`track.control.feedback_path`), where the motion does not repeat or the
-            feedback alone holds the robot from nine tenths of the starts. At the end the feedback
-            alone becomes the policy where it holds more starts, or as many more closely.
+            feedback alone, of the exact root, holds the robot from nine tenths of the starts. At
+            the end the feedback alone becomes the policy where it holds more starts, or as many
+            more closely.
         curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.

@@ -9,7 +9,7 @@ measured along the heading: the only figure that detects a robot jumping from pl
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -139,7 +139,8 @@ def environment_of(policy: Evaluated, control: ControlConfig) -> TrackConfig | P
     if not isinstance(held, Mapping):
         return PaperConfig() if paper else TrackConfig(control=control)
     kind: type[PaperConfig | TrackConfig] = PaperConfig if paper else TrackConfig
-    return without_curiosity(fact(policy, "environment", kind))
+    found = without_curiosity(fact(policy, "environment", kind))
+    return replace(found, control=control) if isinstance(found, TrackConfig) else found
 
 
 def reward_report(

@@ -153,11 +153,11 @@ class TrackMode:
 def control_of(config: TrackConfig) -> ControlConfig:
     """Return the control law of a training: with a robot's own measurements the feedback is from an
     estimate of the root, unless it is set otherwise; a policy of many motions has none."""
-    control = config.control
-    if config.observation in ("full", "full_preview"):
-        return control
-    if config.observation == "preview" and control.feedback is None:
+    control, seen = config.control, config.observation
+    if seen in AHEAD and control.feedback is None:
         return replace(control, feedback=0.0)
+    if seen in ("full", "full_preview") or control.feedback == 0:
+        return control
     return replace(control, root_state=control.root_state or "estimated")
 
 

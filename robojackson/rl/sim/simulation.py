@@ -55,11 +55,13 @@ def resolved(
     defaults."""
     pushed = random is not None and random.pushes > 0
     usual = robot.description.robust_action_factor if pushed else 1.0
+    share = feedback_share(robot, control)
     return replace(
         control,
         substeps=control.substeps or robot.substeps,
         feedforward=feedforward_share(robot, control),
-        feedback=feedback_share(robot, control),
+        feedback=share,
+        root_state=control.root_state if share else None,
         feedback_path=feedback_path(robot, control),
         action_factor=control.action_factor or usual,
     )

@@ -105,6 +105,7 @@ def test_its_modules_are_short_and_need_three_packages(made: Made) -> None:
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ImportFrom):
                 names.add(str(node.module).split(".")[0])
+        assert ("__main__" in text) == (name == "run.py"), "a part alone would let the robot fall"
     assert "robojackson" not in names
     assert not (made.folder / "policy_obs.onnx").exists(), "no other runner knows the feedback"
     readme = (made.folder / "README.md").read_text()
@@ -124,6 +125,14 @@ print(run.main(0.15, 0.3, False, run.Runner))
     result = run_bare(packages, code, str(made.folder), cwd=made.folder.parent)
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith("danced 0.15 s")
+
+
+def test_a_robot_without_an_accelerometer_is_refused_before_it_moves(made: Made) -> None:
+    sim = Simulation(made.robot, LAW, 1)
+    blind = Replayed(sim, made.robot)
+    blind.force = None  # type: ignore[method-assign,assignment]
+    with pytest.raises(SystemExit, match="accelerometer"):
+        Runner(made.folder, blind)
 
 
 @pytest.mark.parametrize("name", ["deploy.yaml", "robot.xml", "feedback.npz", "policy.onnx"])

@@ -11,11 +11,13 @@ from robojackson.rl.config.train_config import (
     ControlConfig,
     EvaluateConfig,
     PaperConfig,
+    TrackConfig,
 )
 from robojackson.rl.evaluation.controllers import control_of
-from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
+from robojackson.rl.evaluation.policy_evaluation import environment_of, evaluate_policy
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
+from robojackson.rl.modes import track_mode
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.feedforward import lead_of
@@ -23,6 +25,7 @@ from robojackson.rl.sim.motors import actuation_facts
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot, load_robot
+from tests.fixtures.deploy_policies import random_policy
 
 STEPS = 160
 
@@ -199,6 +202,17 @@ def test_a_policy_for_a_robot_of_another_name_is_refused(
         evaluate_policy(stranger, sway, robot, EvaluateConfig())
 
 
+def test_an_older_policy_of_own_measurements_is_audited_under_its_own_law(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """It had no feedback; today a training with the same configuration would have."""
+    policy = random_policy(robot, sway)
+    environment = environment_of(policy, control_of(policy, robot))
+    assert isinstance(environment, TrackConfig)
+    assert environment.observation == "onboard"
+    assert track_mode.control_of(environment).feedback == 0.0
+
+
 @pytest.mark.medium
 def test_a_robot_whose_gains_changed_since_the_training_is_refused(
     robot: Robot, sway: ReferenceMotion
@@ -206,7 +220,9 @@ def test_a_robot_whose_gains_changed_since_the_training_is_refused(
     policy = idle(robot, sway)
     facts = dict(policy.facts) | {"actuation": actuation_facts(robot, ControlConfig())}
     known = dataclasses.replace(policy, facts=facts)
-    older = ControlConfig(feedback=0.0, feedback_path="reference", action_factor=1.0)
+    older = ControlConfig(
+        feedback=0.0, feedback_path="reference", action_factor=1.0, root_state="exact"
+    )
     assert control_of(known, robot) == older
     softer = load_robot(dataclasses.replace(robot.description, action_scale={"*_knee": 0.2}))
     with pytest.raises(BadPolicy, match=r"action_scale 0\.5 of right_knee .* has 0\.2 now"):
