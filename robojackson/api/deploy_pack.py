@@ -86,7 +86,7 @@ def write_deploy_pack(
     evaluated = evaluation_in(path.parent, evaluation)
     feedback, control = None, control_of(found, machine)
     if control.feedback:
-        feedback = deployed_feedback(control, motion, machine, progress)
+        feedback = deployed_feedback(control, motion, machine, progress, found)
     files = pack_files(parts, machine, ingredients, evaluated, feedback)
     written = write_pack(Path(folder), files, ingredients, evaluated)
     layout = {"observations": parts.observation_size, "layout_sha256": parts.layout_sha256}

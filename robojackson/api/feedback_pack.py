@@ -22,6 +22,8 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
+from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import OTHER_PATH, is_of_another_path
 from robojackson.rl.sim import leg_odometry
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import Motors
@@ -123,17 +125,27 @@ def _evaluation_of(tracker: str, motion: Path, given: FilePath | None) -> Figure
 
 
 def deployed_feedback(
-    control: ControlConfig, reference: ReferenceMotion, robot: Robot, progress: Progress
+    control: ControlConfig,
+    reference: ReferenceMotion,
+    robot: Robot,
+    progress: Progress,
+    policy: Policy | None = None,
 ) -> DeployedFeedback:
     """Put together what a pack is made from, in the order of the hinges.
 
+    Args:
+        policy: What was trained on top of it; None for the feedback alone.
+
     Raises:
-        BadPolicy: the robot has hinges without a motor, or no feedback.
+        BadPolicy: the robot has hinges without a motor, or no feedback, or this is another than
+            the policy's.
     """
     motor, hinge = motor_of_hinge(robot), Motors.of(robot.model).hinge
     found = feedback_of(robot, [reference], control, progress)
     if found is None:
         raise BadPolicy(f"robot {robot.description.name!r} has no feedback along a motion")
+    if policy is not None and is_of_another_path(policy, found.outline):
+        raise BadPolicy(OTHER_PATH)
     gains, lead = found.gains, lead_of(robot, reference, control)
     targets = np.asarray(reference.qpos, float)[:, 7:][:, hinge]
     targets = targets if lead is None else targets + lead

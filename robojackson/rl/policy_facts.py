@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TypeVar, get_args
 
 import numpy as np
+from jaxtyping import Float
 from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadPolicy
@@ -17,6 +18,14 @@ from robojackson.rl.sim.stock_humanoid import stock_observation_size
 from robojackson.robot.model import Robot
 
 T = TypeVar("T")
+OUTLINE = "feedback_outline"
+"""Name of the outline of the feedback's path in a policy's file."""
+OTHER_PATH = (
+    "the policy was trained on top of feedback along another path than this machine has found: "
+    "copy the folder feedback of the store in which it was trained, or train it here"
+)
+SAME_PATH_RAD = 0.02
+"""Largest difference of a hinge at which a path is the same."""
 
 
 def mode_of(policy: Policy) -> str:
@@ -36,6 +45,25 @@ def is_of_another_motion(policy: Policy, reference: ReferenceMotion) -> bool:
     trained on."""
     learnt = policy.facts.get("reference_sha256")
     return learnt is not None and learnt != poses_sha256(reference)
+
+
+def outline_facts(outline: Float[np.ndarray, "M J"] | None) -> dict[str, object]:
+    """Return the outline of the path of a training's feedback, for the policy's file; nothing where
+    there is none."""
+    return {} if outline is None else {OUTLINE: np.round(outline, 4).tolist()}
+
+
+def is_of_another_path(policy: Policy, outline: Float[np.ndarray, "M J"] | None) -> bool:
+    """Return whether the feedback keeps to another path than in the policy's training.
+
+    The search for a path amplifies how a processor rounds: another machine may find another one
+    (docs/learning_g1.md, "One search of a long motion is a lottery").
+    """
+    held = policy.facts.get(OUTLINE)
+    if held is None or outline is None:
+        return False
+    then = np.asarray(held, float)
+    return then.shape != outline.shape or bool(np.abs(then - outline).max() > SAME_PATH_RAD)
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:

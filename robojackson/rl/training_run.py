@@ -22,6 +22,7 @@ from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import outline_facts
 from robojackson.rl.tensorboard_log import ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
@@ -209,6 +210,7 @@ class Run:
             "control": asdict(self.core.sim.control),
             "actuation": self.core.sim.actuation,
             "repeats": self.core.mode.repeats,
+            **outline_facts(self.core.clip.outline),
             "environment": json.loads(json.dumps(asdict(config.environment))),
         }
 

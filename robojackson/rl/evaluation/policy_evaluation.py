@@ -40,7 +40,13 @@ from robojackson.rl.evaluation.verdict import verdict_on, without_short_figures
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.paper_mode import facing_ahead
 from robojackson.rl.policy import Policy
-from robojackson.rl.policy_facts import fact, is_of_another_motion, mode_of
+from robojackson.rl.policy_facts import (
+    OTHER_PATH,
+    fact,
+    is_of_another_motion,
+    is_of_another_path,
+    mode_of,
+)
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -90,6 +96,8 @@ def evaluate_policy(
     if isinstance(environment, PaperConfig):
         reference = facing_ahead(reference)
     clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
+    if isinstance(policy, Policy) and is_of_another_path(policy, clip.outline):
+        log.warning("%s; here it will dance worse", OTHER_PATH)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     scorer, meter = (

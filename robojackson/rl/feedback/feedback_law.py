@@ -9,6 +9,9 @@ from robojackson.rl.feedback.nominal_path import Gains
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.tangent import state_difference
 
+MOMENTS = 8
+"""Moments of a path by which it is known again."""
+
 
 @dataclass(frozen=True)
 class StepFeedback:
@@ -65,6 +68,12 @@ class Feedback:
         """Share of the starts from which it keeps robots upright by itself, 0..1, of the motion
         that falls most; NaN where that was not tried."""
         return float(np.min(self.gains.held))
+
+    @property
+    def outline(self) -> Float[np.ndarray, "M J"]:
+        """Hinge angles of the path that it keeps a robot on, at `MOMENTS` moments, rad."""
+        path = self.gains.qpos
+        return np.asarray(path[np.linspace(0, len(path) - 1, MOMENTS).astype(int), 7:])
 
     def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
         """Return the feedback at rows of the joined motions, whose cycles have moved them by

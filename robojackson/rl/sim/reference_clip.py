@@ -100,6 +100,12 @@ class Clip:
         unknown or without one."""
         return np.nan if self._law is None else self._law.held
 
+    @property
+    def outline(self) -> Float[np.ndarray, "M J"] | None:
+        """Outline of the path that the feedback keeps robots on (`Law.outline`); None without
+        one."""
+        return None if self._law is None else self._law.outline
+
     def starts(self) -> Int[np.ndarray, " R"]:
         """Return the steps from which a motion can be followed: all but the end of one that
         ends."""

@@ -41,5 +41,9 @@ class Law(Protocol):
         """Return the feedback at rows whose cycles have moved them by `shift`, m."""
 
     @property
+    def outline(self) -> Float[np.ndarray, "M J"]:
+        """Hinge angles of the path that it keeps a robot on, at a few moments, rad."""
+
+    @property
     def held(self) -> float:
         """Share of the time that it keeps robots upright by itself, 0..1; NaN where unknown."""

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from robojackson.api.deploy_pack import write_deploy_pack
+from robojackson.errors import BadPolicy
 from robojackson.formats.deploy.polished_runner import Runner
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation.controllers import trained_driver
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.policy import Policy
+from robojackson.rl.policy_facts import outline_facts
 from robojackson.rl.sim import root_estimate
 from robojackson.rl.sim.accelerometer import Accelerometer
 from robojackson.rl.sim.motors import Motors
@@ -125,6 +127,21 @@ print(run.main(0.15, 0.3, False, run.Runner))
     result = run_bare(packages, code, str(made.folder), cwd=made.folder.parent)
     assert result.returncode == 0, result.stderr
     assert result.stdout.startswith("danced 0.15 s")
+
+
+def test_a_policy_of_another_path_is_refused(made: Made, tmp_path: Path) -> None:
+    """As where another machine searched it."""
+    clip = driven_clip(made.robot, made.reference, LAW)
+    assert clip.outline is not None
+    made.reference.save(tmp_path / "reference.parquet")
+    for apart, fits in ((0.001, True), (0.1, False)):
+        facts = {**made.policy.facts, **outline_facts(clip.outline + apart)}
+        path = replace(made.policy, facts=facts).save(tmp_path / "policy.safetensors")
+        if fits:
+            assert write_deploy_pack(path, tmp_path / "pack", robot=made.robot)["robot"]
+        else:
+            with pytest.raises(BadPolicy, match="another path"):
+                write_deploy_pack(path, tmp_path / "pack", robot=made.robot)
 
 
 def test_a_robot_without_an_accelerometer_is_refused_before_it_moves(made: Made) -> None:
