@@ -29,6 +29,7 @@ from benchmarks.learning.league_rows import (
     REPLAY,
     SCRATCH,
     TRAINED,
+    TRAINED_ONBOARD,
     TWIST2,
     Row,
     kept_rows,
@@ -54,6 +55,7 @@ MISSING = {
     TRAINED: NOT_OURS,
     SCRATCH: NOT_OURS,
     ONBOARD: NOT_OURS,
+    TRAINED_ONBOARD: NOT_OURS,
     POLISHED: NOT_OURS,
 }
 """Why rows of holosoma's motion cannot be had."""

@@ -28,6 +28,10 @@ INSTANT, REPLAY, TWIST2 = "ours, instant (regulator)", "reference replayed", "tw
 INSTANT_ONBOARD = "ours, instant (regulator_onboard)"
 TRAINED, ORDINARY = "ours, regulator polished by training", "ours, ordinary training on regulator"
 SCRATCH, ONBOARD = "ours, from scratch", "ours, from scratch (onboard)"
+TRAINED_ONBOARD = "ours, regulator_onboard polished by training"
+WITHOUT_ESTIMATE = ("g1_hip_shake", "g1_walk", "g1_authors_apt1")
+"""Motions whose onboard rows are from scratch, from before a training had an estimated root; today
+that is `--set track.control.feedback=0`."""
 POLISHED = "ours, twist2 polished"
 NOT_POLISHED = ("g1_walk",)
 """Motions whose rows are ordinary trainings on the feedback: that of seed 100 along the reference,
@@ -73,7 +77,8 @@ def of_trainings(folders: Folders, move: str) -> Iterator[Row]:
     """Yield the means over seeds of what our trainings of a move have left."""
     who = ORDINARY if move in NOT_POLISHED else TRAINED
     yield _trained(folders, move, move, who, note=NOTES.get(move, ""))
-    yield _trained(folders, f"{move}_onboard", move, ONBOARD)
+    onboard = ONBOARD if move in WITHOUT_ESTIMATE else TRAINED_ONBOARD
+    yield _trained(folders, f"{move}_onboard", move, onboard)
 
 
 def _trained(folders: Folders, name: str, move: str, who: str, **known: Any) -> Row:
