@@ -3,6 +3,8 @@
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.rl.evaluation.duration import minutes_needed, seconds_to_evaluate
+from robojackson.rl.modes.track_mode import control_of
+from robojackson.rl.sim.motors import feedback_share
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -33,4 +35,5 @@ def training_time(
         max(settings.evaluate.seconds, len(motion) * motion.dt), settings.render.max_seconds
     )
     after_s = evaluation_s + PAGE_S + PICTURE_S * settings.render.fps * shown_s
-    return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion))
+    fed = feedback_share(load_robot(robot), control_of(settings.train.track)) > 0
+    return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion, fed))

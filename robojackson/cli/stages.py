@@ -181,7 +181,12 @@ def evaluate(
     """Evaluate a policy or a tracker; with a folder, also write its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
     from robojackson.api.trackers import load_tracker
-    from robojackson.cli.training_words import pack_of, train_after, train_this
+    from robojackson.cli.training_words import (
+        is_fed_onboard,
+        pack_of,
+        train_after,
+        train_this,
+    )
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
@@ -205,15 +210,6 @@ def evaluate(
     else:
         following = train_after(policy, reference, LONGER_MINUTES)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
-
-
-def is_fed_onboard(policy: Path) -> bool:
-    """Return whether a policy needs feedback from an estimated root, which other files than a
-    deploy pack do not have."""
-    from robojackson.rl.policy import load_policy
-
-    law = load_policy(policy).facts.get("control")
-    return isinstance(law, Mapping) and law.get("root_state") == "estimated"
 
 
 def is_tracker(policy: Path) -> bool:

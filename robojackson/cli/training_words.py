@@ -57,6 +57,13 @@ def _flat(values: Mapping[str, object], above: str = "") -> Iterator[tuple[str, 
             yield f"{above}{key}", value
 
 
+def is_fed_onboard(policy: Path) -> bool:
+    """Return whether a policy needs feedback from an estimated root, which other files than a
+    deploy pack do not have."""
+    law = load_policy(policy).facts.get("control")
+    return isinstance(law, Mapping) and law.get("root_state") == "estimated"
+
+
 def pack_of(tracker: Path, reference: Path, out: Path | None) -> str:
     """Return the command that writes the deploy pack of a tracker.
 

@@ -20,6 +20,9 @@ AROUND_A_STEP = 1.6
 CYCLIC_MINUTES, WALKING_MINUTES, OTHER_MINUTES = 10.0, 20.0, 40.0
 """Training times of the bundled hip_shake, walk and dance_b, minutes of one core
 (docs/benchmarks_learning.md)."""
+FED_MINUTES, FED_MINUTES_A_SECOND = 5.0, 1.0
+"""Training time on top of the G1's feedback at least, and for every second of a motion that ends,
+minutes of one core (docs/learning_g1.md, "In short")."""
 MEASURED_S = 4.0
 """Length of these motions, seconds; longer ones take proportionally longer."""
 WALKS_M = 0.2
@@ -51,12 +54,17 @@ def seconds_a_step(robot: Robot) -> float:
     return float(np.median(times))
 
 
-def minutes_needed(reference: ReferenceMotion) -> float:
+def minutes_needed(reference: ReferenceMotion, fed: bool = False) -> float:
     """Return the approximate training time until a robot dances this, minutes of one core.
 
-    Estimated by kind and length of the motion from the bundled ones; not guaranteed.
+    Estimated by kind and length of the motion from measured ones; not guaranteed.
+
+    Args:
+        fed: Whether the robot has feedback along the motion, whose search is not included.
     """
     seconds = len(reference) * reference.dt
+    if fed:
+        return FED_MINUTES if reference.cyclic else max(FED_MINUTES, FED_MINUTES_A_SECOND * seconds)
     usual = OTHER_MINUTES
     if reference.cyclic:
         walks = float(np.linalg.norm(reference.cycle_offset[:2])) > WALKS_M

@@ -47,6 +47,7 @@ from robojackson.rl.policy_facts import (
     is_of_another_path,
     mode_of,
 )
+from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
@@ -91,13 +92,11 @@ def evaluate_policy(
     robot = equipped(policy, robot)
     control = control_of(policy, robot)
     require_same_clock(control_step(robot, control), reference.dt)
-    _warn_about_other_motion(policy, reference)
     environment = environment_of(policy, control)
-    if isinstance(environment, PaperConfig):
-        reference = facing_ahead(reference)
+    _warn_about_other_motion(policy, reference)
+    reference = facing_ahead(reference) if isinstance(environment, PaperConfig) else reference
     clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
-    if isinstance(policy, Policy) and is_of_another_path(policy, clip.outline):
-        log.warning("%s; here it will dance worse", OTHER_PATH)
+    _warn_about_other_path(policy, clip)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     scorer, meter = (
@@ -185,6 +184,12 @@ def _warn_about_other_motion(policy: Evaluated, reference: ReferenceMotion) -> N
         log.warning(
             "the policy was trained on another reference motion than the one it is evaluated on"
         )
+
+
+def _warn_about_other_path(policy: Evaluated, clip: Clip) -> None:
+    """Warn about feedback that keeps to another path than the training's."""
+    if isinstance(policy, Policy) and is_of_another_path(policy, clip.outline):
+        log.warning("%s; here it will dance worse", OTHER_PATH)
 
 
 def _recorded_rollout(rollouts: Rollouts, starts: Starts) -> np.ndarray:
