@@ -4,6 +4,7 @@ The same results as `mj_kinematics` and `mj_jac`, without a Python loop over fra
 of MuJoCo: root linear in the world, root angular in the body, hinges. World, metres, radians.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,14 +56,21 @@ class Posed:
         return axis, moment
 
 
-def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
-    """Return the forward kinematics of every frame (equations of `mj_kinematics`)."""
+def pose(
+    tree: Tree, qpos: Float[np.ndarray, "T nq"], bodies_only: Sequence[int] | None = None
+) -> Posed:
+    """Return the forward kinematics of every frame (equations of `mj_kinematics`).
+
+    Args:
+        bodies_only: Bodies to place, in the order of the tree and with all that they hang from
+            (`above`); the others stay at the origin. None places all.
+    """
     frames, bodies, joints = len(qpos), len(tree.parent), len(tree.zero)
     body_pos, body_rot = np.zeros((frames, bodies, 3)), np.zeros((frames, bodies, 3, 3))
     anchor, axis = np.zeros((frames, joints, 3)), np.zeros((frames, joints, 3))
     body_rot[:, 0] = np.eye(3)
     angle = qpos[:, 7:] - tree.zero
-    for body in range(1, bodies):
+    for body in range(1, bodies) if bodies_only is None else bodies_only:
         if body == tree.root:
             body_pos[:, body], body_rot[:, body] = qpos[:, :3], quat_to_matrix(qpos[:, 3:7])
             continue
@@ -76,6 +84,16 @@ def pose(tree: Tree, qpos: Float[np.ndarray, "T nq"]) -> Posed:
             pos = anchor[:, hinge] - rot @ tree.anchor[hinge]
         body_pos[:, body], body_rot[:, body] = pos, rot
     return placed(tree, body_pos, body_rot, anchor, axis)
+
+
+def above(tree: Tree, bodies: Int[np.ndarray, " N"]) -> tuple[int, ...]:
+    """Return bodies and all that they hang from but the world, in the order of the tree."""
+    found = set[int]()
+    for body in bodies.tolist():
+        while body > 0:
+            found.add(body)
+            body = int(tree.parent[body])
+    return tuple(sorted(found))
 
 
 def placed(

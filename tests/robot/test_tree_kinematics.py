@@ -5,6 +5,7 @@ import numpy as np
 
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import (
+    above,
     centre_of_mass,
     com_jacobian,
     difference,
@@ -39,6 +40,16 @@ def test_the_point_jacobian_is_mj_jac(robot: Robot, poses: np.ndarray, rng: np.r
         for body in bodies:
             mujoco.mj_jac(robot.model, data, expected, None, points[index, body], body)
             np.testing.assert_allclose(ours[index, body], expected, atol=1e-12)
+
+
+def test_legs_alone_are_where_the_whole_robot_has_them(robot: Robot, poses: np.ndarray) -> None:
+    own, feet = tree(robot), robot.contact_bodies
+    legs = above(own, feet)
+    assert len(legs) < len(own.parent) - 1
+    whole, part = pose(own, poses), pose(own, poses, legs)
+    np.testing.assert_array_equal(part.ball_pos, whole.ball_pos)
+    found = [point_jacobian(own, at, whole.ball_pos, feet) for at in (whole, part)]
+    np.testing.assert_array_equal(*found)
 
 
 def test_the_centre_of_mass_and_its_jacobian_are_mujocos(robot: Robot, poses: np.ndarray):

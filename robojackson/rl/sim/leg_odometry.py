@@ -19,7 +19,7 @@ from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.rl.sim.accelerometer import swing_velocity
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.robot.model import Robot
-from robojackson.robot.tree_kinematics import point_jacobian, pose, tree
+from robojackson.robot.tree_kinematics import above, point_jacobian, pose, tree
 
 LOW_M = 0.004
 """Height above the lowest sole point that reduces a point's weight by a factor of e, metres."""
@@ -77,8 +77,11 @@ class LegOdometry:
         """
         qpos, qvel = qpos.copy(), qvel.copy()
         qpos[:, :3] = qvel[:, :3] = 0.0
-        points, speeds = self._soles.at(qpos, qvel)
-        there, sliding = self._soles.at(step.qpos, step.qvel)
+        n = len(qpos)
+        places, moves = self._soles.at(
+            np.concatenate([qpos, step.qpos]), np.concatenate([qvel, step.qvel])
+        )
+        points, speeds, there, sliding = places[:n], moves[:n], places[n:], moves[n:]
         sliding = np.where(there[:, :, 2:] < NEAR_M, sliding, 0.0) * (1.0, 1.0, 0.0)
         lowest = points[:, :, 2].min(1)
         carried = np.exp(-(points[:, :, 2] - lowest[:, None]) / LOW_M)
@@ -119,17 +122,14 @@ class _Soles:
     """The lowest points of a robot's contact balls on a level floor."""
 
     def __init__(self, robot: Robot) -> None:
-        self._tree, self._bodies, self._radii = (
-            tree(robot),
-            robot.contact_bodies,
-            robot.contact_radii,
-        )
+        self._tree, self._bodies = tree(robot), robot.contact_bodies
+        self._radii, self._legs = robot.contact_radii, above(tree(robot), robot.contact_bodies)
 
     def at(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> tuple[Float[np.ndarray, "N C 3"], Float[np.ndarray, "N C 3"]]:
         """Return their positions, and the velocities of the balls."""
-        posed = pose(self._tree, qpos)
+        posed = pose(self._tree, qpos, self._legs)
         jacobian = point_jacobian(self._tree, posed, posed.ball_pos, self._bodies)
         points = posed.ball_pos.copy()
         points[:, :, 2] -= self._radii
