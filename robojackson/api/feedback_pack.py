@@ -24,22 +24,15 @@ from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.feedback.standing_feet import LOW_M, foot_sites
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import OTHER_PATH, is_of_another_path
-from robojackson.rl.sim import leg_odometry
 from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.leg_odometry import CONSTANTS
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import tree
 
-ODOMETRY = {
-    "low": leg_odometry.LOW_M,
-    "near": leg_odometry.NEAR_M,
-    "share": leg_odometry.SHARE,
-    "doubt_speed": leg_odometry.DOUBT_M_S,
-    "doubt_height": leg_odometry.DOUBT_M,
-    "foot_low": LOW_M,
-}
+ODOMETRY = {**CONSTANTS, "foot_low": LOW_M}
 
 
 def write_feedback_pack(

@@ -140,6 +140,29 @@ def test_a_policy_that_sees_ahead_does_the_same_as_in_python(
     assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
 
 
+def test_feedback_from_an_estimated_root_is_the_same_as_in_python(
+    shaking: RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+    robot = replace(
+        shaking.robot, description=replace(shaking.robot.description, imu=(0.1, -0.05, -0.1))
+    )
+    policy = steadied(made_policy(robot))
+    control = {**policy.facts["control"], "root_state": "estimated"}  # type: ignore[dict-item]
+    policy = Policy(policy.layers, {**policy.facts, "control": control})
+    data = live_data(policy, shaking.reference, robot)
+    assert data is not None
+    fed = data["feedback"]
+    assert isinstance(fed, dict)
+    found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
+    assert found["deviations"].max() <= NEAR_MM
+    ours = in_python(replace(shaking, policy=policy, robot=robot), data, np.zeros((RECORDS, 2)))
+    assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
+    fed["odometry"]["imu"] = [1.0, 1.0, 0.0]
+    without = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
+    assert np.median(without["deviations"]) > np.median(found["deviations"])
+
+
 def test_feedback_from_where_the_feet_stand_is_the_same_as_in_python(
     shaking: RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,72 @@ const Dance = (() => {
     data.qacc_warmstart.set(forces.at(-1));
   }
 
+  /* A number of a normal distribution (Box and Muller). */
+  const normal = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
+
+  /* A value moved to a measured one, by half of the share where that is `doubt` away. */
+  function corrected(value, measured, share, doubt) {
+    const apart = value.map((from, k) => measured[k] - from), heed = share / (1 + (Math.hypot(...apart) / doubt) ** 2);
+    return value.map((from, k) => from + heed * apart[k]);
+  }
+
+  /* Height and velocity of the root from what a robot measures, as `rl.sim.leg_odometry`. */
+  class Odometry {
+    constructor(mujoco, model, rule) {
+      Object.assign(this, { model, rule, noise: rule.noise, gravity: model.opt.gravity[2] });
+      this.soles = rule.soles.map(([name, centre, radius]) => {
+        const body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, name), joints = [];
+        for (let up = body; up > 0; up = model.body_parentid[up]) {
+          for (let k = 0; k < model.body_jntnum[up]; k++) if (model.body_jntadr[up] + k > 0) joints.push(model.body_jntadr[up] + k);
+        }
+        return { body, centre, radius, joints };
+      });
+    }
+
+    begin() { this.last = null; }
+
+    /* Lowest height of each sole point, and its velocity; without that of the root unless `whole`. */
+    at(data, qpos, qvel, whole) {
+      const own = matrixOf(qpos, 3), spin = [0, 1, 2].map((k) => own[3 * k] * qvel[3] + own[3 * k + 1] * qvel[4] + own[3 * k + 2] * qvel[5]);
+      return this.soles.map(({ body, centre, radius, joints }) => {
+        const turn = matrixOf(data.xquat, 4 * body), place = [0, 1, 2].map((k) => data.xpos[3 * body + k] + turn[3 * k] * centre[0] + turn[3 * k + 1] * centre[1] + turn[3 * k + 2] * centre[2]);
+        const speed = cross(spin, place.map((value, k) => value - qpos[k]));
+        for (const joint of joints) {
+          const arm = place.map((value, k) => value - data.xanchor[3 * joint + k]), move = cross([0, 1, 2].map((k) => data.xaxis[3 * joint + k]), arm);
+          for (let k = 0; k < 3; k++) speed[k] += move[k] * qvel[this.model.jnt_dofadr[joint]];
+        }
+        if (whole) for (let k = 0; k < 3; k++) speed[k] += qvel[k];
+        return { height: place[2] - radius, speed };
+      });
+    }
+
+    /* One control step of dt seconds; the reference is that of the next step. */
+    estimate(data, dt, reference, ghost) {
+      const { rule } = this, { qpos, qvel } = data, own = matrixOf(qpos, 3), inside = cross([3, 4, 5].map((k) => qvel[k]), rule.imu);
+      const swing = [0, 1, 2].map((k) => own[3 * k] * inside[0] + own[3 * k + 1] * inside[1] + own[3 * k + 2] * inside[2]);
+      const aims = this.at(ghost, reference.qpos, reference.qvel, true), soles = this.at(data, qpos, qvel, false);
+      const floor = Math.min(...soles.map((sole) => sole.height)), carries = soles.map((sole) => Math.exp((floor - sole.height) / rule.low)), all = carries.reduce((a, b) => a + b);
+      const measured = [0, 1, 2].map((k) => soles.reduce((sum, sole, i) => {
+        const slides = k < 2 && aims[i].height < rule.near ? aims[i].speed[k] : 0;
+        return sum + carries[i] * (slides - sole.speed[k]);
+      }, 0) / all);
+      const felt = [0, 1, 2].map((k) => qvel[k] + swing[k]), aim = Array.from(reference.qvel.slice(0, 3));
+      let velocity, height;
+      if (!this.last) {
+        velocity = corrected(aim, measured, 1, rule.doubt_speed);
+        height = reference.qpos[2] - dt * aim[2];
+      } else {
+        const assumed = [0, 0, dt * (this.gravity - this.model.opt.gravity[2])];
+        const predicted = felt.map((value, k) => this.last.known[k] + value - this.last.felt[k] + assumed[k] + dt * this.noise * normal() - swing[k]);
+        velocity = corrected(predicted, measured, rule.share, rule.doubt_speed);
+        height = this.last.height + dt * velocity[2];
+      }
+      [height] = corrected([height], [qpos[2] - floor], rule.share, rule.doubt_height);
+      this.last = { felt, known: velocity.map((value, k) => value + swing[k]), height };
+      return { height, velocity };
+    }
+  }
+
   class Dancer {
     constructor(mujoco, dance) {
       Object.assign(this, { mujoco, dance, mode: 'policy' });
@@ -73,6 +139,7 @@ const Dance = (() => {
         const { gain, step, offset, qpos, qvel } = dance.feedback;
         this.feedback = { gain: shares(gain, new Float32Array(bytes(step)), 2 * nv), offset: doubles(offset), qpos: doubles(qpos), qvel: doubles(qvel), apart: new Float64Array(2 * nv) };
         if (dance.feedback.places) this.feedback.places = doubles(dance.feedback.places);
+        if (dance.feedback.odometry) this.odometry = new Odometry(mujoco, this.model, dance.feedback.odometry);
       }
       this.layers = dance.layers.map(({ weight, bias, inputs }) => ({ inputs, weight: new Float32Array(bytes(weight)), bias: new Float32Array(bytes(bias)) }));
       this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
@@ -100,6 +167,7 @@ const Dance = (() => {
       this.mujoco.mj_resetData(this.model, this.data);
       this.data.qpos.set(state.qpos); this.data.qvel.set(state.qvel);
       this.mujoco.mj_forward(this.model, this.data);
+      this.odometry?.begin();
       this.step = this.first = step; this.last.fill(0); this.fallen = false; this.error = 0; this.danced = 0;
     }
 
@@ -166,12 +234,25 @@ const Dance = (() => {
       for (let k = 0; k < 3; k++) apart[3 + k] = factor * turn[1 + k];
       for (let k = 6; k < nv; k++) apart[k] = qpos[k + 1] - own[from + k + 1];
       for (let k = 0; k < nv; k++) apart[nv + k] = qvel[k] - feedback.qvel[row * nv + k];
+      if (this.odometry) {
+        const { height, velocity } = this.known();
+        apart[2] += height - qpos[2];
+        for (let k = 0; k < 3; k++) apart[nv + k] += velocity[k] - qvel[k];
+      }
       return Float64Array.from({ length: nu }, (_, k) => {
         let sum = feedback.offset[row * nu + k];
         for (let i = 0, at = (row * nu + k) * 2 * nv; i < 2 * nv; i++, at++) sum += gain[at] * apart[i];
         const most = this.dance.feedback.limit[k];
         return -Math.min(most, Math.max(-most, sum));
       });
+    }
+
+    /* Height and velocity of the root as the robot knows them. */
+    known() {
+      const reference = this.state(this.step + 1);
+      this.ghost.qpos.set(reference.qpos);
+      this.mujoco.mj_kinematics(this.model, this.ghost);
+      return this.odometry.estimate(this.data, this.dance.dt, reference, this.ghost);
     }
 
     /* How far the feet that stand are from their places in the plane of the floor, as `standing_feet.Feet`. */
@@ -243,13 +324,15 @@ const Dance = (() => {
 
     /* Largest distance, millimetres, of a body from where Python's MuJoCo has it after a recorded start. */
     deviation(record) {
-      const keep = this.mode; this.mode = 'policy';
+      const keep = this.mode, quiet = this.odometry; this.mode = 'policy';
+      if (quiet) quiet.noise = 0;
       this.start(record.step, { qpos: Float64Array.from(record.qpos), qvel: Float64Array.from(record.qvel) });
       for (let k = 0; k < record.steps; k++) this.advance();
       const { xpos } = this.data;
       let most = 0;
       for (let i = 0; i < record.places.length; i += 3) most = Math.max(most, Math.hypot(...[0, 1, 2].map((k) => xpos[3 + i + k] - record.places[i + k])));
       this.mode = keep;
+      if (quiet) quiet.noise = quiet.rule.noise;
       return 1000 * most;
     }
   }

@@ -4,8 +4,6 @@ rule.
 Metres, radians, seconds, newton-metres.
 """
 
-from collections.abc import Mapping
-
 import mujoco
 import numpy as np
 
@@ -27,13 +25,16 @@ from robojackson.rl.modes.observation import (
 )
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import mode_of, observation_of
+from robojackson.rl.sim.accelerometer import NOISE_M_S2
 from robojackson.rl.sim.feedforward import lead_of
+from robojackson.rl.sim.leg_odometry import CONSTANTS
 from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.preview import preview_of
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
 
 LARGEST, TINY = 32767, 1e-30
 """Largest number of 16 bits, and of a motor without gains."""
@@ -44,8 +45,8 @@ def live_data(
 ) -> dict[str, object] | None:
     """Return the data of a live dance; None where a browser cannot run it.
 
-    A browser cannot run a policy of the paper's mode, feedback from an estimated root, a tracker
-    whose network is a file of another project, or a robot whose meshes collide.
+    A browser cannot run a policy of the paper's mode, a tracker whose network is a file of another
+    project, or a robot whose meshes collide.
     """
     if not runs_in_a_browser(policy):
         return None
@@ -98,13 +99,10 @@ def live_data(
 
 
 def runs_in_a_browser(policy: Evaluated) -> bool:
-    """Return whether a policy's network is one of ours without extras, or it has none; a page knows
-    the root's place and velocity, and estimates none."""
+    """Return whether a policy's network is one of ours without extras, or it has none; the tracker
+    of an estimated root, whose control law is its own, is not among them."""
     if isinstance(policy, Policy):
-        held = policy.facts.get("control")
-        law = held if isinstance(held, Mapping) else {}
-        estimates = law.get("feedback") and law.get("root_state") == "estimated"
-        return mode_of(policy) == "track" and not estimates
+        return mode_of(policy) == "track"
     if isinstance(policy, RegulatorTracker):
         return policy.description.root_state == "exact"
     return isinstance(policy, PolicyTracker)
@@ -129,15 +127,31 @@ def _feedback(
         return None
     gains, feet = found.gains, np.unique(robot.contact_keypoints)
     step = np.maximum(np.abs(gains.gain).max(-1), TINY).astype(np.float32) / LARGEST
-    anchored = bool(np.isfinite(gains.places).all())
+    estimated = control.root_state == "estimated"
+    places = found.feet.places(gains.qpos) if estimated else gains.places
+    anchored = bool(np.isfinite(places).all())
     return {
+        "odometry": _odometry(robot) if estimated else None,
         "gain": packed(np.round(gains.gain / step[..., None]), np.int16),
         "step": packed(step),
         **{name: packed(getattr(gains, name), np.float64) for name in ("offset", "qpos", "qvel")},
         "limit": found.limit.tolist(),
-        "places": packed(gains.places, np.float64) if anchored else None,
+        "places": packed(places, np.float64) if anchored else None,
         "feet": feet.tolist(),
         "low": LOW_M,
+    }
+
+
+def _odometry(robot: Robot) -> dict[str, object]:
+    """Return what a page estimates height and velocity of the root from (`rl.sim.leg_odometry`)."""
+    shape = tree(robot)
+    names = [robot.model.body(int(body)).name for body in shape.ball_body]
+    balls = zip(names, shape.ball_position.tolist(), robot.contact_radii.tolist(), strict=True)
+    return {
+        **CONSTANTS,
+        "imu": list(robot.description.imu),
+        "noise": NOISE_M_S2,
+        "soles": [list(ball) for ball in balls],
     }
 
 

@@ -28,6 +28,8 @@ def live_records(
     driver, count = trained_driver(policy, robot, reference), len(starts.step)
     sim = Simulation(robot, driver.control, count)
     sim.place(np.arange(count), starts.qpos, starts.qvel)
+    if sim.root_estimate is not None:
+        sim.root_estimate.noise = 0.0  # a browser draws other numbers
     steps = SUBSTEPS // (sim.control.substeps or 1)
     last = np.zeros((count, robot.model.nu))
     for step in range(steps):

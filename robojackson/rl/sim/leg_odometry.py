@@ -30,6 +30,15 @@ SHARE = 0.3
 DOUBT_M_S, DOUBT_M = 0.05, 0.02
 """Differences at which only half of that is corrected."""
 
+CONSTANTS = {
+    "low": LOW_M,
+    "near": NEAR_M,
+    "share": SHARE,
+    "doubt_speed": DOUBT_M_S,
+    "doubt_height": DOUBT_M,
+}
+"""The same for other programs: deploy packs and live pages."""
+
 
 @dataclass(frozen=True)
 class RootState:

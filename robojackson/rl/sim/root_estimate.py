@@ -19,7 +19,12 @@ class RootEstimate:
 
     A robot's odometry begins when it is placed. Within a control step the estimate is computed
     once.
+
+    Attributes:
+        noise: Of the accelerometers, multiples of `accelerometer.NOISE_M_S2`.
     """
+
+    noise = 1.0
 
     def __init__(self, robot: Robot, sim: Moving, n: int) -> None:
         self._accelerometer = Accelerometer(sim, robot.description.imu)
@@ -53,7 +58,7 @@ class RootEstimate:
         stale = ~self._current
         if stale.any():
             before = self._odometry.now
-            force = None if before is None else self._accelerometer.read(noise)
+            force = None if before is None else self._accelerometer.read(self.noise * noise)
             found = self._odometry.estimate(qpos, qvel, force, step, self._begins)
             qpos, qvel = (
                 np.where(stale[:, None], new, old)
