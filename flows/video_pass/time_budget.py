@@ -30,10 +30,11 @@ def training_time(
     if is_records_only():
         return None
     motion = artifact_tables.read(ReferenceMotion, Store.from_environment(), reference)
-    evaluation_s = seconds_to_evaluate(load_robot(robot), motion, settings.evaluate)
+    machine = load_robot(robot)
+    evaluation_s = seconds_to_evaluate(machine, motion, settings.evaluate)
     shown_s = min(
         max(settings.evaluate.seconds, len(motion) * motion.dt), settings.render.max_seconds
     )
     after_s = evaluation_s + PAGE_S + PICTURE_S * settings.render.fps * shown_s
-    fed = feedback_share(load_robot(robot), control_of(settings.train.track)) > 0
+    fed = feedback_share(machine, control_of(settings.train.track)) > 0
     return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion, fed))

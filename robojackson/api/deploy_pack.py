@@ -32,7 +32,7 @@ from robojackson.rl.evaluation.controllers import control_of
 from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
 from robojackson.rl.policy import Policy, load_policy
-from robojackson.rl.policy_facts import mode_of, observation_of
+from robojackson.rl.policy_facts import mode_of, observation_of, recorded_law
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.robot.model import Robot
@@ -151,8 +151,7 @@ def _require_onboard(policy: Policy) -> None:
     Raises:
         BadPolicy: another mode, observation or law, or feedback from the exact root.
     """
-    held = policy.facts.get("control")
-    law: Mapping[str, object] = held if isinstance(held, Mapping) else {}
+    law = recorded_law(policy)
     kind = law.get("law", ControlConfig().law)
     if mode_of(policy) == "track" and observation_of(policy) != "onboard":
         raise BadPolicy(

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
 from robojackson.api.pack_parts import evaluation_in, machine_of, motor_of_hinge, write_pack
@@ -12,7 +11,7 @@ from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.api.robots import load_robot
 from robojackson.api.trackers import load_tracker
 from robojackson.errors import BadConfiguration, BadPolicy
-from robojackson.formats.deploy.deployed_feedback import Ball, DeployedFeedback
+from robojackson.formats.deploy.deployed_feedback import DeployedFeedback, balls_of, soles_of
 from robojackson.formats.deploy.licence_passport import Ingredient, with_declared
 from robojackson.formats.deploy.pack_files import feedback_files
 from robojackson.formats.deploy.pack_readme import Figures
@@ -30,7 +29,6 @@ from robojackson.rl.sim.motors import Motors
 from robojackson.rl.trackers.tracker import Tracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
-from robojackson.robot.tree_kinematics import tree
 
 ODOMETRY = {**CONSTANTS, "foot_low": LOW_M}
 
@@ -142,7 +140,6 @@ def deployed_feedback(
     gains, lead = found.gains, lead_of(robot, reference, control)
     targets = np.asarray(reference.qpos, float)[:, 7:][:, hinge]
     targets = targets if lead is None else targets + lead
-    balls = tree(robot)
     sites = foot_sites(robot)
     model = robot.model
     return DeployedFeedback(
@@ -153,22 +150,9 @@ def deployed_feedback(
         limit=found.limit[motor],
         path_qpos=gains.qpos,
         path_qvel=gains.qvel,
-        places=found.feet.places(gains.qpos),
-        soles=_balls(robot, balls.ball_body, balls.ball_position, robot.contact_radii),
-        feet=_balls(robot, model.site_bodyid[sites], model.site_pos[sites], np.zeros(len(sites))),
+        places=found.footholds,
+        soles=soles_of(robot),
+        feet=balls_of(robot, model.site_bodyid[sites], model.site_pos[sites], np.zeros(len(sites))),
         imu=robot.description.imu,
         odometry=ODOMETRY,
-    )
-
-
-def _balls(
-    robot: Robot,
-    bodies: Int[np.ndarray, " C"],
-    centres: Float[np.ndarray, "C 3"],
-    radii: Float[np.ndarray, " C"],
-) -> tuple[Ball, ...]:
-    names = [robot.model.body(int(body)).name for body in bodies]
-    return tuple(
-        Ball(name, (float(x), float(y), float(z)), float(radius))
-        for name, (x, y, z), radius in zip(names, centres, radii, strict=True)
     )

@@ -10,7 +10,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import load_policy
-from robojackson.rl.policy_facts import is_of_another_motion
+from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
 
 
 def train_this(reference: Path) -> str:
@@ -60,8 +60,7 @@ def _flat(values: Mapping[str, object], above: str = "") -> Iterator[tuple[str, 
 def is_fed_onboard(policy: Path) -> bool:
     """Return whether a policy needs feedback from an estimated root, which other files than a
     deploy pack do not have."""
-    law = load_policy(policy).facts.get("control")
-    return isinstance(law, Mapping) and law.get("root_state") == "estimated"
+    return recorded_law(load_policy(policy)).get("root_state") == "estimated"
 
 
 def pack_of(tracker: Path, reference: Path, out: Path | None) -> str:

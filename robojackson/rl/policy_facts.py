@@ -40,6 +40,12 @@ def mode_of(policy: Policy) -> str:
     return mode
 
 
+def recorded_law(policy: Policy) -> Mapping[str, object]:
+    """Return the control law as a policy's file has it, unchecked; empty where it has none."""
+    held = policy.facts.get("control")
+    return held if isinstance(held, Mapping) else {}
+
+
 def is_of_another_motion(policy: Policy, reference: ReferenceMotion) -> bool:
     """Return whether a policy's file names another reference motion than this as the one it was
     trained on."""

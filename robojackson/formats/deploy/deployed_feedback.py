@@ -6,10 +6,12 @@ World frame of the motion, metres, radians, seconds; hinges in the order of qpos
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robojackson.formats.containers import npz_archive
 from robojackson.formats.deploy.deployed_machine import DeployedMachine
+from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import tree
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,31 @@ class Ball:
     def as_row(self) -> list[object]:
         """Return it as deploy.yaml holds it."""
         return [self.body, list(self.centre), self.radius]
+
+
+def balls_of(
+    robot: Robot,
+    bodies: Int[np.ndarray, " C"],
+    centres: Float[np.ndarray, "C 3"],
+    radii: Float[np.ndarray, " C"],
+) -> tuple[Ball, ...]:
+    """Return points of bodies by the names of the bodies.
+
+    Args:
+        centres: In the frames of the bodies, m.
+        radii: Metres.
+    """
+    names = [robot.model.body(int(body)).name for body in bodies]
+    return tuple(
+        Ball(name, (float(x), float(y), float(z)), float(radius))
+        for name, (x, y, z), radius in zip(names, centres, radii, strict=True)
+    )
+
+
+def soles_of(robot: Robot) -> tuple[Ball, ...]:
+    """Return the points that carry a robot."""
+    own = tree(robot)
+    return balls_of(robot, own.ball_body, own.ball_position, robot.contact_radii)
 
 
 @dataclass(frozen=True)

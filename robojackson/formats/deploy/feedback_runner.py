@@ -70,8 +70,8 @@ class Runner(NetworkRunner):
 
     def at(self, step: int) -> dict[str, Array]:
         """Return the motion and its feedback at a step; one that repeats travels on."""
-        count = len(self.roots)
-        cycle, row = divmod(step, count) if self.cfg["cyclic"] else (0, min(step, count - 1))
+        row = self.row_of(step)
+        cycle = (step - row) // len(self.roots) if self.cfg["cyclic"] else 0
         found = {name: value[row].copy() for name, value in self.rows.items()}
         for place in (found["qpos"][:3], found["path_qpos"][:3], found["places"]):
             place += cycle * np.array(self.cfg["cycle_offset"])
@@ -84,8 +84,8 @@ class Runner(NetworkRunner):
     def step(self) -> str:
         """Run one control step towards the next row; return the reason for a stop, else nothing."""
         now, ahead = self.at(self.passed), self.at(self.passed + 1)
-        self.passed, last = self.passed + 1, len(self.roots) - 1
-        self.row = self.passed % (last + 1) if self.cfg["cyclic"] else min(self.passed, last)
+        self.passed += 1
+        self.row = self.row_of(self.passed)
         measured = quat, gyro, angle, rate = self.robot.read()
         target = self.aimed(ahead, *measured)
         turned, apart, limit = np.zeros(4), np.zeros(self.model.nv), self.cfg["feedback_limit"]

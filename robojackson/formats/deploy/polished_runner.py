@@ -23,10 +23,8 @@ class Runner(FeedbackRunner):
 
     def load(self, folder: Path) -> None:
         """Load all three."""
-        NetworkRunner.load(self, folder)
-        command = self.command
         super().load(folder)
-        self.command = command
+        NetworkRunner.load(self, folder)
 
     def aimed(self, ahead: dict[str, np.ndarray], *measured: np.ndarray) -> np.ndarray:
         """Return the targets of the network, which the feedback moves."""

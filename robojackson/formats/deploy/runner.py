@@ -99,10 +99,14 @@ class Runner:
         self.action = self.session.run(["actions"], feed)[0][0].astype(float)
         return np.asarray(self.default + self.scale * self.action + 0 * obs.sum())
 
+    def row_of(self, step: int) -> int:
+        """Return the row of a step: after the last one the first of a motion that repeats."""
+        count = len(self.roots)
+        return step % count if self.cfg["cyclic"] else min(step, count - 1)
+
     def step(self) -> str:
         """Run one control step towards the next row; return the reason for a stop, else nothing."""
-        ahead, last = self.row + 1, len(self.command) - 1
-        self.row = ahead % (last + 1) if self.cfg["cyclic"] else min(ahead, last)
+        self.row = self.row_of(self.row + 1)
         measured = self.robot.read()
         return self.drive_or_stop(self.act(*measured), measured[3])
 

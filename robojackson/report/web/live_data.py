@@ -7,6 +7,7 @@ Metres, radians, seconds, newton-metres.
 import mujoco
 import numpy as np
 
+from robojackson.formats.deploy.deployed_feedback import soles_of
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.web.live_model import live_model
 from robojackson.report.web.live_records import live_records
@@ -34,7 +35,6 @@ from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
-from robojackson.robot.tree_kinematics import tree
 
 LARGEST, TINY = 32767, 1e-30
 """Largest number of 16 bits, and of a motor without gains."""
@@ -128,7 +128,7 @@ def _feedback(
     gains, feet = found.gains, np.unique(robot.contact_keypoints)
     step = np.maximum(np.abs(gains.gain).max(-1), TINY).astype(np.float32) / LARGEST
     estimated = control.root_state == "estimated"
-    places = found.feet.places(gains.qpos) if estimated else gains.places
+    places = found.footholds if estimated else gains.places
     anchored = bool(np.isfinite(places).all())
     return {
         "odometry": _odometry(robot) if estimated else None,
@@ -144,14 +144,11 @@ def _feedback(
 
 def _odometry(robot: Robot) -> dict[str, object]:
     """Return what a page estimates height and velocity of the root from (`rl.sim.leg_odometry`)."""
-    shape = tree(robot)
-    names = [robot.model.body(int(body)).name for body in shape.ball_body]
-    balls = zip(names, shape.ball_position.tolist(), robot.contact_radii.tolist(), strict=True)
     return {
         **CONSTANTS,
         "imu": list(robot.description.imu),
         "noise": NOISE_M_S2,
-        "soles": [list(ball) for ball in balls],
+        "soles": [ball.as_row() for ball in soles_of(robot)],
     }
 
 

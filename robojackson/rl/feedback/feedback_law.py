@@ -1,6 +1,7 @@
 """How gains along a motion move the targets of motors. World frame, metres, radians."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -26,24 +27,13 @@ class StepFeedback:
     places: Float[np.ndarray, "N F 3"]
 
     def targets(
-        self,
-        qpos: Float[np.ndarray, "N nq"],
-        qvel: Float[np.ndarray, "N nv"],
-        beside_feet: bool = False,
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad.
-
-        Args:
-            beside_feet: Whether to follow the motion from where the feet of each robot stand, as a
-                sampled path is always followed.
-        """
+        """Return the offsets of the motors' targets, rad."""
         apart = state_difference(qpos, qvel, self.qpos, self.qvel)
-        places, moved = self.places, np.isfinite(self.places[:, 0, 0])
-        if beside_feet and not moved.all():
-            places = np.where(moved[:, None, None], places, self.feet.places(self.qpos))
-            moved = np.ones(len(moved), bool)
+        moved = np.isfinite(self.places[:, 0, 0])
         if moved.any():
-            apart[moved, :2] -= self.feet.apart(qpos[moved], places[moved])
+            apart[moved, :2] -= self.feet.apart(qpos[moved], self.places[moved])
         turned = (self.gain @ apart[:, :, None])[:, :, 0] + self.offset
         result: np.ndarray = -np.clip(turned, -self.limit, self.limit)
         return result
@@ -75,11 +65,27 @@ class Feedback:
         path = self.gains.qpos
         return np.asarray(path[np.linspace(0, len(path) - 1, MOMENTS).astype(int), 7:])
 
-    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepFeedback:
+    @cached_property
+    def footholds(self) -> Float[np.ndarray, "S F 3"]:
+        """Places of the feet at every step, also of motions that are followed where they are."""
+        return self.feet.places(self.gains.qpos)
+
+    def at(
+        self,
+        row: Int[np.ndarray, " N"],
+        shift: Float[np.ndarray, "N 3"],
+        beside_feet: bool = False,
+    ) -> StepFeedback:
         """Return the feedback at rows of the joined motions, whose cycles have moved them by
-        `shift`, m."""
+        `shift`, m.
+
+        Args:
+            beside_feet: Whether to follow the motion from where the feet of each robot stand, as a
+                sampled path is always followed.
+        """
         gains = self.gains
         qpos = gains.qpos[row]
         qpos[:, :3] += shift
         found = (gains.gain[row], gains.offset[row], qpos, gains.qvel[row])
-        return StepFeedback(*found, self.limit, self.feet, gains.places[row] + shift[:, None])
+        places = (self.footholds if beside_feet else gains.places)[row] + shift[:, None]
+        return StepFeedback(*found, self.limit, self.feet, places)

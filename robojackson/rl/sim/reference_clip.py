@@ -161,7 +161,7 @@ class Clip:
             beside_feet: bool = False,
         ) -> Float[np.ndarray, "N nu"]:
             row, shift, _ = self._split(step - 1)
-            return law.at(row, shift).targets(qpos, qvel, beside_feet)
+            return law.at(row, shift, beside_feet).targets(qpos, qvel)
 
         return targets
 

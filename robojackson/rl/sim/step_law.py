@@ -10,16 +10,9 @@ class StepLaw(Protocol):
     """Offsets of the targets of N robots at one step of their references."""
 
     def targets(
-        self,
-        qpos: Float[np.ndarray, "N nq"],
-        qvel: Float[np.ndarray, "N nv"],
-        beside_feet: bool = False,
+        self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> Float[np.ndarray, "N nu"]:
-        """Return the offsets of the motors' targets, rad.
-
-        Args:
-            beside_feet: Whether to follow the motion from where the feet of each robot stand.
-        """
+        """Return the offsets of the motors' targets, rad."""
 
 
 class StepCorrection(Protocol):
@@ -31,14 +24,23 @@ class StepCorrection(Protocol):
         qvel: Float[np.ndarray, "N nv"],
         beside_feet: bool = False,
     ) -> Float[np.ndarray, "N nu"]:
-        """Return `StepLaw.targets`."""
+        """Return `StepLaw.targets` of `Law.at`."""
 
 
 class Law(Protocol):
     """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
 
-    def at(self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]) -> StepLaw:
-        """Return the feedback at rows whose cycles have moved them by `shift`, m."""
+    def at(
+        self,
+        row: Int[np.ndarray, " N"],
+        shift: Float[np.ndarray, "N 3"],
+        beside_feet: bool = False,
+    ) -> StepLaw:
+        """Return the feedback at rows whose cycles have moved them by `shift`, m.
+
+        Args:
+            beside_feet: Whether to follow the motion from where the feet of each robot stand.
+        """
 
     @property
     def outline(self) -> Float[np.ndarray, "M J"]:

@@ -14,6 +14,7 @@ from robojackson.rl.sim.disturbances import PUSH, PUSH_EVERY_S
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.variation import Variation, varied, varied_models
 from robojackson.robot.model import Robot
+from tests.fixtures.resumed_environments import require_the_same_after_resuming
 
 N = 4
 
@@ -161,14 +162,7 @@ def test_a_resumed_environment_goes_on_with_the_same_disturbances(
     config = dataclasses.replace(TrackConfig(), random=random)
     first, second = (TrackingCore(robot, sway, config, N, 3) for _ in range(2))
     actions = np.random.default_rng(1).uniform(-0.3, 0.3, (120, N, robot.model.nu))
-    first.reset()
-    for action in actions[:60]:
-        first.step(action)
-    second.restore(first.state())
-    second.rng.bit_generator.state = first.rng.bit_generator.state
-    for action in actions[60:]:
-        seen, again = first.step(action).observation, second.step(action).observation
-        np.testing.assert_array_equal(seen, again)
+    require_the_same_after_resuming(first, second, actions, 60)
 
 
 def test_robots_with_seeds_of_their_own_are_pushed_as_each_would_be_alone(robot: Robot) -> None:

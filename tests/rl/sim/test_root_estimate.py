@@ -16,6 +16,7 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
+from tests.fixtures.resumed_environments import require_the_same_after_resuming
 
 N = 3
 ESTIMATED = ControlConfig(
@@ -114,11 +115,4 @@ def test_a_resumed_training_goes_on_with_the_same_estimates(
     first, second = (TrackingCore(robot, sway, config, N, 3) for _ in range(2))
     assert first.actor_size < first.observation_size
     actions = np.random.default_rng(1).uniform(-0.1, 0.1, (50, N, robot.model.nu))
-    first.reset()
-    for action in actions[:23]:
-        first.step(action)
-    second.restore(first.state())
-    second.rng.bit_generator.state = first.rng.bit_generator.state
-    for action in actions[23:]:
-        seen, again = first.step(action).observation, second.step(action).observation
-        np.testing.assert_array_equal(seen, again)
+    require_the_same_after_resuming(first, second, actions, 23)
