@@ -64,12 +64,16 @@ def is_of_another_path(policy: Policy, outline: Float[np.ndarray, "M J"] | None)
 
     The search for a path amplifies how a processor rounds: another machine may find another one
     (docs/learning_g1.md, "One search of a long motion is a lottery").
+
+    Raises:
+        BadPolicy: the file has no outline but something else.
     """
-    held = policy.facts.get(OUTLINE)
-    if held is None or outline is None:
+    if outline is None or OUTLINE not in policy.facts:
         return False
-    then = np.asarray(held, float)
-    return then.shape != outline.shape or bool(np.abs(then - outline).max() > SAME_PATH_RAD)
+    then = fact(policy, OUTLINE, list[list[float]])
+    if [len(row) for row in then] != [len(row) for row in outline]:
+        return True
+    return bool(np.abs(np.array(then) - outline).max() > SAME_PATH_RAD)
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:

@@ -144,6 +144,18 @@ def test_a_policy_of_another_path_is_refused(made: Made, tmp_path: Path) -> None
                 write_deploy_pack(path, tmp_path / "pack", robot=made.robot)
 
 
+@pytest.mark.parametrize("outline", ["abc", [["a"]], 3])
+def test_an_outline_that_is_none_is_refused_by_its_name(
+    made: Made, outline: object, tmp_path: Path
+) -> None:
+    made.reference.save(tmp_path / "reference.parquet")
+    facts = {**made.policy.facts, "feedback_outline": outline}
+    path = replace(made.policy, facts=facts).save(tmp_path / "policy.safetensors")
+    with pytest.raises(BadPolicy, match="feedback_outline"):
+        write_deploy_pack(path, tmp_path / "pack", robot=made.robot)
+    assert not (tmp_path / "pack").exists()
+
+
 def test_a_robot_without_an_accelerometer_is_refused_before_it_moves(made: Made) -> None:
     sim = Simulation(made.robot, LAW, 1)
     blind = Replayed(sim, made.robot)
