@@ -24,6 +24,7 @@ from robojackson.rl.feedback.feedback_law import Feedback
 from robojackson.rl.feedback.nominal_path import Gains, Progress, no_progress
 from robojackson.rl.feedback.path_trial import LARGEST_MOVE
 from robojackson.rl.feedback.regulator import regulator, settings
+from robojackson.rl.feedback.search_log import SearchLog
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import (
@@ -58,7 +59,7 @@ def feedback_of(
     """Return the feedback along motions; None where the control law has none.
 
     Args:
-        progress: Called with a name, the steps that are done, and all.
+        progress: Called with a name, the steps that are done, and all; log lines without it.
     """
     share = feedback_share(robot, control)
     if not share or control.law != "pd":
@@ -83,7 +84,8 @@ def _cached(
             found = Gains(*(arrays[name].astype(float) for name in ARRAYS))
             if _fits(found, robot, motion):
                 return found
-    gains = _single(regulator_of(robot, motion, control, progress))
+    heard = SearchLog(len(motion) * motion.dt) if progress is no_progress else progress
+    gains = _single(regulator_of(robot, motion, control, heard))
     _keep(path, gains)
     return gains
 

@@ -1,6 +1,7 @@
 """Linear-quadratic feedback: it keeps a robot on its reference, and is computed once."""
 
 import dataclasses
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig, TrackConfig
 from robojackson.rl.evaluation.rollouts import Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of
-from robojackson.rl.feedback import cached_feedback, regulator
+from robojackson.rl.feedback import cached_feedback, regulator, search_log
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.feedback.nominal_path import Gains
 from robojackson.rl.modes.track_mode import control_of
@@ -94,6 +95,39 @@ def test_on_its_nominal_path_the_feedback_adds_its_offset_alone(
     far = moved + 0.0
     far[:, 7:] += 5.0
     assert np.abs(step.targets(far, found.gains.qvel[row])).max() <= found.limit.max() + 1e-12
+
+
+def test_a_search_without_another_progress_logs_its_length_and_then_what_is_done(
+    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture, tmp_path: Path,
+) -> None:  # fmt: skip
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
+    monkeypatch.setattr(search_log, "EVERY_S", 0.0)
+    with caplog.at_level(logging.INFO):
+        cached_feedback.feedback_of(robot, [sway], FED)
+    first, *rest = [record.getMessage() for record in caplog.records]
+    length = f"{len(sway) * sway.dt:.1f} s of motion"
+    assert length in first
+    assert rest, "a line for each part"
+    assert all(length in line and "s so far" in line for line in rest), rest
+    caplog.clear()
+    with caplog.at_level(logging.INFO):
+        cached_feedback.feedback_of(robot, [sway], FED)
+    assert not caplog.records, "what is in the cache needs no line"
+
+
+def test_the_log_of_a_search_has_a_line_every_fifteen_seconds(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    times = iter([0.0, 5.0, 16.0, 20.0, 32.0])
+    with caplog.at_level(logging.INFO):
+        heard = search_log.SearchLog(12.3, clock=lambda: next(times))
+        for step in (1, 2, 3, 4):
+            heard("sampled path", step, 4)
+    assert [record.getMessage() for record in caplog.records][1:] == [
+        "feedback along 12.3 s of motion: sampled path, 50 %, 16 s so far",
+        "feedback along 12.3 s of motion: sampled path, 100 %, 32 s so far",
+    ]
 
 
 def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
