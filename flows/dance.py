@@ -17,6 +17,7 @@ from flows.video_pass.dance_stages import make_dance
 from flows.video_pass.inputs import Minutes, Search, Seconds, Source, name_of, videos_of
 from robojackson.cli.options import yaml_text
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robust_training import robust_dance
 from robojackson.pipeline.yaml_loader import load
 from storage.leftovers import sweep
 from storage.store import Store
@@ -54,6 +55,7 @@ async def dance(
     search: Search = Search(),  # noqa: B008 (frozen)
     robot: str | None = None,
     instant: bool = False,
+    robust: bool = False,
 ) -> dict[str, Any]:
     """Turn the name of a dance, or a video of it, into a robot that dances it.
 
@@ -67,13 +69,14 @@ async def dance(
         search: How a dance is looked for that is given by its name.
         robot: Name of one of configs/robots; or path, where the worker is, of the YAML of your own.
         instant: Whether a tracker (`robojackson trackers`) dances at once and nothing is trained.
+        robust: Whether it is trained with varied physics, noise and pushes, and gets a passport.
     """
     store = Store.from_environment()
     sweep(store, work=False)
     given: dict[str, Any] = {"minutes": minutes, "robot": yaml_text(robot)}
     given["instant"] = instant or None
     given = {**(overrides or {}), **{k: v for k, v in given.items() if v is not None}}
-    settings = load(PipelineConfig, config, given)
+    settings = load(PipelineConfig, config, robust_dance(config, given) if robust else given)
     async with videos_of(source, search) as paths:
         done = await make_dance(store, paths, settings, start_s, end_s)
     answer = done.answer

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from prefect import flow
 from pydantic import Field
 
-from robojackson.cli.walker_training import PIPELINE, ROBOT
+from robojackson.cli.learning.walker_training import PIPELINE, ROBOT
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot

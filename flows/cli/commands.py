@@ -52,6 +52,9 @@ INSTANT_MINUTES, SEARCH_MINUTES = 1.0, 3.5
 """About what an instant dance takes until its page, for its bar: with a network, and the search of
 `regulator` besides (24 to 371 CPU-seconds on quiet cores, mean of thirteen motions 201)."""
 INSTANT = "--instant"
+Robust = Annotated[
+    bool, typer.Option(help="Train with varied physics, noise and pushes; with a passport.")
+]
 BEATS = ("beats", "precision", "recall", "f1", "bas")
 """How a dance meets its music."""
 LONG_ENOUGH_S = 10.0
@@ -79,6 +82,7 @@ def dance(
     instant: Annotated[
         bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
     ] = False,
+    robust: Robust = False,
     music: Annotated[Path | None, typer.Option(help="A sound file instead of the clip's.")] = None,
     shape: Annotated[
         Shape | None, typer.Option("--format", help="Of the video: row, square, vertical or wide.")
@@ -91,6 +95,7 @@ def dance(
     from flows.search import dance_source
     from flows.search.dance_source import is_on_the_web, load_settings, resolve
     from flows.search.requests import require_findable
+    from robojackson.pipeline.robust_training import robust_dance
     from storage.store import Store
 
     found = None if is_on_the_web(source) else resolve(source)
@@ -106,6 +111,8 @@ def dance(
     overrides = overrides_from(set_, given | {"dancer.number": person, "detector": quality})
     if force:
         overrides["gate"] = False
+    if robust:
+        overrides = robust_dance(config, overrides)
     settings = load_settings(config, overrides)
     dance_source.require_music(settings)
     if found is not None:

@@ -36,5 +36,6 @@ def training_time(
         max(settings.evaluate.seconds, len(motion) * motion.dt), settings.render.max_seconds
     )
     after_s = evaluation_s + PAGE_S + PICTURE_S * settings.render.fps * shown_s
-    fed = feedback_share(machine, control_of(settings.train.track)) > 0
+    track = settings.train.track
+    fed = feedback_share(machine, control_of(track)) > 0 and not track.random.pushes
     return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion, fed))

@@ -48,7 +48,10 @@ def train(
     config: TrainConfigFile = None,
     robust: Annotated[
         bool,
-        typer.Option(help="Vary friction, masses, gains and delays; noise and pushes."),
+        typer.Option(
+            help="Vary friction, masses, gains and delays; noise and pushes. A robot with feedback "
+            "observes what it measures itself (track.observation=onboard)."
+        ),
     ] = False,
     run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",
     move: Annotated[str, typer.Option(help="Name of the dance in the tables.")] = "",
@@ -60,19 +63,21 @@ def train(
 ) -> CommandResult:
     """Train a policy to follow a motion: policy.safetensors, episodes.parquet; resumes by
     itself."""
-    from robojackson.cli import cards, training_process
+    from robojackson.cli import cards
+    from robojackson.cli.learning import training_process, training_request
 
     if parent:
         training_process.end_with(parent)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    given = {"mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed}
+    given: dict[str, object] = {
+        "mode": mode, "trainer": trainer, "steps": steps, "minutes": minutes, "seed": seed
+    }  # fmt: skip
+    overrides = overrides_from(set_, given)
     if robust:
-        from robojackson.rl.evaluation.passport import robust_settings
-
-        given = {**robust_settings(), **given}
+        overrides = training_request.robust(reference, robot, config, setup, overrides)
     trained = training_process.train(
-        reference, out, setup, overrides_from(set_, given), run_id, move, force, robot, config
+        reference, out, setup, overrides, run_id, move, force, robot, config
     )
     return CommandResult(trained, text=cards.shown(trained, cards.train_lines(trained), verbose))
 
@@ -96,8 +101,8 @@ def pretrain(
     as_json: Json = False,
 ) -> CommandResult:
     """Train a robot that walks, for `--setup pretrain`: walker_KIND.safetensors and walker.json."""
-    from robojackson.cli import walker_training
-    from robojackson.cli.training_process import end_with
+    from robojackson.cli.learning import walker_training
+    from robojackson.cli.learning.training_process import end_with
 
     if parent:
         end_with(parent)
@@ -136,8 +141,8 @@ def evaluate(
 ) -> CommandResult:
     """Evaluate a policy or a tracker on stock physics from many starts, beside simple baselines."""
     from robojackson.cli import cards, stages
+    from robojackson.cli.learning.training_process import end_with
     from robojackson.cli.passport_text import passport_lines
-    from robojackson.cli.training_process import end_with
 
     if parent:
         end_with(parent)

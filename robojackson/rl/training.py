@@ -8,7 +8,7 @@ tables.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from pathlib import Path
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.config.tqc_config import PRESETS
+from robojackson.rl.config.track_config import RandomConfig, TrackConfig
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
@@ -91,9 +92,11 @@ def _choice(
     core: TrackingCore,
 ) -> Choice:
     """Return what a polish is written by: the policy or, if that holds more, the feedback alone."""
-    motions, threads = motions_of(reference), core.config.threads
-    if not tqc.zero_init or len(motions) > 1:
+    motions, track = motions_of(reference), core.config
+    disturbed = isinstance(track, TrackConfig) and track.random != RandomConfig()
+    if not tqc.zero_init or len(motions) > 1 or disturbed:
         return as_trained
+    threads = track.threads
     return partial(better_of, reference=motions[0], robot=robot, clip=core.clip, threads=threads)
 
 
@@ -142,7 +145,14 @@ def polishes(
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:
-    """Return TQC's configuration with the layers of the networks, whose sizes must fit."""
+    """Return TQC's configuration with the layers of the networks, whose inputs must fit."""
+    learnt = networks.facts.get("environment")
+    kind = learnt.get("observation", "full") if isinstance(learnt, Mapping) else None
+    if config.mode == "track" and kind not in (None, config.track.observation):
+        raise BadPolicy(
+            f"start {config.start!r} observes {kind} and this training "
+            f"{config.track.observation}, in another order: --set track.observation={kind}"
+        )
     found = (networks.observation_size, networks.action_size)
     needed = (core.observation_size, core.action_size)
     if found != needed:

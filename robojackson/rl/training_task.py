@@ -14,6 +14,8 @@ from robojackson.robot.model import Robot
 
 OLDER_TQC = {"n_steps": 1}
 """Numbers of TQC from before they could be chosen."""
+OLDER_RANDOM = {"least": 1.0}
+"""Ranges of physics from before they could be graded."""
 SHOWN = 4
 """Differences that a message names at most."""
 
@@ -80,7 +82,11 @@ class Task:
             **kept,
             "task": {**json.loads(json.dumps(asdict(self))), **task},
             "tqc": {**OLDER_TQC, **tqc},
-            "track": {**track, "control": _older_control(track)},
+            "track": {
+                **track,
+                "control": _older_control(track),
+                "random": {**OLDER_RANDOM, **track.get("random", {})},
+            },
         }
 
 

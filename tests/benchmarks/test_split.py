@@ -9,7 +9,7 @@ import pytest
 from benchmarks.learning.motion_distance import contained_share, windows
 from benchmarks.learning.policies import BLAS, FROZEN, MOVES, frozen_kernels, require_frozen
 from benchmarks.learning.split import DUPLICATE_SHARE, load_split, shares
-from robojackson.cli import walker_training
+from robojackson.cli.learning import walker_training
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence

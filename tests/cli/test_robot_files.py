@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from robojackson.cli import exporting, stages, training_process, walker_training
+from robojackson.cli import exporting, stages
+from robojackson.cli.learning import training_process, walker_training
 from robojackson.cli.options import yaml_text
 from robojackson.errors import BadConfiguration, RejectedReference, UnknownName
 from robojackson.motion.reference_motion import ReferenceMotion

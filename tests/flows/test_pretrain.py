@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from flows import pretrain
-from robojackson.cli import stages, walker_training
+from robojackson.cli import stages
+from robojackson.cli.learning import walker_training
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.rl.walkers import walker_file
 from robojackson.robot.model import load_robot

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv
 from robojackson.errors import BadPolicy, MissingDependency
 from robojackson.formats import onnx_policy
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrainConfig
+from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.policy import Policy
@@ -185,6 +185,15 @@ def test_networks_of_another_mode_are_refused(
     _, path = zipped(tmp_path)
     config = TrainConfig(trainer="sb3", steps=16, start=str(path), tqc=SMALL)
     with pytest.raises(BadPolicy, match="takes 348 observations"):
+        train_policy(sway, robot, config, tmp_path / "run")
+
+
+def test_networks_whose_inputs_have_another_order_are_refused(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """As many numbers, of which an actor of the robot's own measurements takes the first."""
+    config = TrainConfig(steps=16, start="walker", tqc=SMALL, track=TrackConfig("onboard"))
+    with pytest.raises(BadPolicy, match=r"observes full .* onboard.*observation=full"):
         train_policy(sway, robot, config, tmp_path / "run")
 
 

@@ -17,6 +17,7 @@ from robojackson.rl import training
 from robojackson.rl.config.train_config import (
     EvaluateConfig,
     PaperConfig,
+    RandomConfig,
     TqcConfig,
     TrackConfig,
     TrainConfig,
@@ -183,22 +184,28 @@ def test_a_finished_run_given_more_steps_goes_on(
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize("polish", [True, False])
-def test_a_polish_is_written_by_what_was_chosen_and_no_other_training(
+@pytest.mark.parametrize(("polish", "pushes"), [(True, 0.0), (False, 0.0), (True, 1.0)])
+def test_a_polish_on_stock_physics_is_written_by_what_was_chosen_and_no_other_training(
     robot: Robot,
     sway: ReferenceMotion,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     polish: bool,
+    pushes: float,
 ) -> None:
+    """The choice is made where nothing is disturbed, which is not what a robust one is for."""
+
     def marked(policy: Policy, **given: object) -> Policy:
         return dataclasses.replace(policy, facts={**policy.facts, "chosen": sorted(given)})
 
     monkeypatch.setattr(training, "better_of", marked)
     config = brief("sbx")
-    config = dataclasses.replace(config, tqc=dataclasses.replace(config.tqc, zero_init=polish))
+    tqc = dataclasses.replace(config.tqc, zero_init=polish)
+    track = dataclasses.replace(config.track, random=RandomConfig(pushes=pushes))
+    config = dataclasses.replace(config, tqc=tqc, track=track)
     found = load_policy(run(robot, sway, config, tmp_path).policy).facts.get("chosen")
-    assert found == (["clip", "reference", "robot", "threads"] if polish else None)
+    chosen = polish and not pushes
+    assert found == (["clip", "reference", "robot", "threads"] if chosen else None)
 
 
 @pytest.mark.medium
@@ -223,7 +230,7 @@ def test_a_robot_whose_yaml_was_changed_between_two_sittings_is_refused(
 
 
 @pytest.mark.medium
-def test_a_checkpoint_from_before_the_yaml_was_kept_is_continued(
+def test_a_checkpoint_from_before_the_yaml_was_kept_and_ranges_graded_is_continued(
     trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     result, _, _, name = trained
@@ -231,6 +238,7 @@ def test_a_checkpoint_from_before_the_yaml_was_kept_is_continued(
     (kept,) = (tmp_path / "out").glob("checkpoint*/run.json")
     state = json.loads(kept.read_text())
     del state["configuration"]["task"]["description_sha256"]
+    del state["configuration"]["track"]["random"]["least"]
     kept.write_text(json.dumps(state))
     assert run(robot, sway, brief(name), tmp_path / "out").steps == state["steps"]
 

@@ -91,7 +91,7 @@ def test_a_cancelled_task_leaves_no_process(
 def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
     child = (
         "import os, sys, time\n"
-        "from robojackson.cli.training_process import end_with\n"
+        "from robojackson.cli.learning.training_process import end_with\n"
         "end_with(int(sys.argv[1]))\n"
         "open(sys.argv[2], 'w').write(str(os.getpid()))\n"
         "time.sleep(60)\n"
@@ -110,7 +110,7 @@ def test_a_training_ends_when_its_parent_is_killed(tmp_path: Path) -> None:
 
 
 def test_a_training_whose_parent_is_gone_does_not_begin() -> None:
-    code = "from robojackson.cli.training_process import end_with; end_with(1)"
+    code = "from robojackson.cli.learning.training_process import end_with; end_with(1)"
     done = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,

@@ -3,6 +3,8 @@
 from dataclasses import fields
 from typing import Literal
 
+import numpy as np
+from jaxtyping import Float
 from pydantic import Field
 
 from robojackson.config import config_dataclass
@@ -186,6 +188,8 @@ class RandomConfig:
         sensor_noise: Noise of the policy's inputs, multiples of mjlab's, unitless.
         pushes: Pushes every 1 to 3 s, multiples of mjlab's, unitless.
         integrators: Robot i gets the i-th, repeatedly; with no names, all have the robot's own.
+        least: Share of these ranges that the first robot of a training has; they grow evenly up to
+            the last one's, which are whole. 1 gives all robots the whole ranges.
     """
 
     friction: float = Field(default=0.0, ge=0, lt=1)
@@ -196,6 +200,11 @@ class RandomConfig:
     sensor_noise: float = Field(default=0.0, ge=0, le=10)
     pushes: float = Field(default=0.0, ge=0, le=10)
     integrators: tuple[Literal["RK4", "Euler", "implicit", "implicitfast"], ...] = ()
+    least: float = Field(default=1.0, ge=0, le=1)
+
+    def shares(self, n: int) -> Float[np.ndarray, " n"]:
+        """Return the share of the ranges that each of n robots has."""
+        return np.linspace(self.least, 1.0, n) if n > 1 else np.ones(n)
 
 
 @config_dataclass

@@ -60,7 +60,8 @@ def minutes_needed(reference: ReferenceMotion, fed: bool = False) -> float:
     Estimated by kind and length of the motion from measured ones; not guaranteed.
 
     Args:
-        fed: Whether the robot has feedback along the motion, whose search is not included.
+        fed: Whether the robot has feedback along the motion, whose search is not included, and is
+            not pushed.
     """
     seconds = len(reference) * reference.dt
     if fed:

@@ -6,7 +6,7 @@ integrator.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -23,10 +23,9 @@ from robojackson.robot.model import Robot
 from robojackson.robot.physics import substeps_of
 
 ROBUST = RandomConfig(
-    friction=0.5, gains=0.2, mass=0.1, com=0.02, delay=0.02, sensor_noise=1.0, pushes=1.0
+    friction=0.5, gains=0.2, mass=0.1, com=0.02, delay=0.02, sensor_noise=1.5, pushes=1.5, least=0.0
 )
-"""Ranges that `train --robust` draws from."""
-ROBUST_FIELDS = ("friction", "gains", "mass", "com", "delay", "sensor_noise", "pushes")
+"""Ranges that `train --robust` draws from, graded from the stock robot to the whole of them."""
 NOMINAL = "nominal"
 LEAST_SHARE = 0.9
 """Share of the nominal strict success that a robust policy keeps in every case."""
@@ -37,9 +36,10 @@ INTEGRATORS = ("Euler", "implicitfast", "RK4")
 DELAYS_S = (0.01, 0.02)
 
 
-def robust_settings() -> dict[str, Any]:
+def robust_ranges() -> dict[str, Any]:
     """Return these ranges as overrides of a training's configuration."""
-    return {f"track.random.{name}": getattr(ROBUST, name) for name in ROBUST_FIELDS}
+    ranges = {name: value for name, value in asdict(ROBUST).items() if name != "integrators"}
+    return {f"track.random.{name}": value for name, value in ranges.items()}
 
 
 @dataclass(frozen=True)

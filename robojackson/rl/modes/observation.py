@@ -7,8 +7,9 @@ its reference.
 `full` is everything that a simulation knows. `onboard` is the robot's own measurements: gyroscope,
 attitude and joints (the inputs of mjlab's tracking task without state estimation): 9 + 5 numbers a
 hinge, 154 on the Unitree G1. `preview` is these and the reference ahead (`sim.preview`), for
-policies that follow more than one motion. In training, the rest follows for the critics alone;
-with `full_preview` for the policy, too.
+policies that follow more than one motion. In training, the rest follows for the critics alone,
+without the sensors' noise (asymmetric actor and critic: Pinto et al., 2018); with `full_preview`
+for the policy, too.
 """
 
 from typing import Literal
@@ -62,33 +63,27 @@ class Observer:
         points: Float[np.ndarray, "N K 3"],
         target: ClipStep,
         last_action: Float[np.ndarray, "N nu"],
+        exact: tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]] | None = None,
     ) -> Float[np.ndarray, "N D"]:
         """Return the observation of N robots whose next reference step is `target`, float32.
 
         Args:
+            qpos, qvel: State as the sensors measure it.
             points: Keypoint sites, world, m.
             last_action: Last action, -1..1.
+            exact: State without the sensors' noise, for what critics alone see; None: as measured.
         """
         turned, target_turn = quat_to_matrix(np.stack([qpos[:, 3:7], target.qpos[:, 3:7]]))
         to_body = np.swapaxes(turned, 1, 2)
         turn = to_body @ target_turn
-
-        def local(vector: np.ndarray) -> np.ndarray:
-            found: np.ndarray = np.einsum("nij,nj->ni", to_body, vector)
-            return found
-
-        angle = 2 * np.pi * target.phase
-        height, gravity = qpos[:, 2:3] - USUAL_HEIGHT_M, to_body[:, :, 2]
-        velocity, gyro = local(qvel[:, :3]), qvel[:, 3:6] * SPEED_SCALE
-        speeds = qvel[:, 6:] * HINGE_SPEED_SCALE
-        phase = np.stack([np.sin(angle), np.cos(angle)], 1)
-        offset = local(target.qpos[:, :3] - qpos[:, :3]) * ROOT_SCALE
+        gyro, speeds = qvel[:, 3:6] * SPEED_SCALE, qvel[:, 6:] * HINGE_SPEED_SCALE
         attitude = [turn[:, :, 0], turn[:, :, 1]]
         aimed = target.qvel[:, 6:] * HINGE_SPEED_SCALE
-        travel = local(target.qvel[:, :3])
-        away = (target.points - points) @ np.swapaxes(to_body, 1, 2)
-        apart = away.reshape(len(qpos), -1) * POINT_SCALE
         done = last_action * 0.5
+        known = (qpos, qvel, to_body)
+        if exact is not None and self.actor_size < self.size:
+            known = (*exact, np.swapaxes(quat_to_matrix(exact[0][:, 3:7]), 1, 2))
+        height, gravity, velocity, phase, offset, travel, apart = _of_root(*known, points, target)
         if self._kind == "full":
             parts = [
                 height, gravity, velocity, gyro, qpos[:, 7:], speeds, phase, offset, *attitude,
@@ -103,3 +98,30 @@ class Observer:
             ]  # fmt: skip
         result: np.ndarray = np.clip(np.concatenate(parts, 1), -CLIP, CLIP).astype(np.float32)
         return result
+
+
+def _of_root(
+    qpos: Float[np.ndarray, "N nq"],
+    qvel: Float[np.ndarray, "N nv"],
+    to_body: Float[np.ndarray, "N 3 3"],
+    points: Float[np.ndarray, "N K 3"],
+    target: ClipStep,
+) -> list[Float[np.ndarray, "N D"]]:
+    """Return height, gravity, velocity, phase, offset and travel of the root, and where the
+    keypoints belong."""
+
+    def local(vector: np.ndarray) -> np.ndarray:
+        found: np.ndarray = np.einsum("nij,nj->ni", to_body, vector)
+        return found
+
+    angle = 2 * np.pi * target.phase
+    away = (target.points - points) @ np.swapaxes(to_body, 1, 2)
+    return [
+        qpos[:, 2:3] - USUAL_HEIGHT_M,
+        to_body[:, :, 2],
+        local(qvel[:, :3]),
+        np.stack([np.sin(angle), np.cos(angle)], 1),
+        local(target.qpos[:, :3] - qpos[:, :3]) * ROOT_SCALE,
+        local(target.qvel[:, :3]),
+        away.reshape(len(qpos), -1) * POINT_SCALE,
+    ]

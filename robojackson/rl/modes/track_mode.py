@@ -86,7 +86,8 @@ class TrackMode:
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         """Return the observations."""
         sim = self.sim
-        return self._observer.observe(*sim.sensed(), sim.points, following, action)
+        exact = (sim.qpos, sim.qvel)
+        return self._observer.observe(*sim.sensed(), sim.points, following, action, exact)
 
     def after(self, command: np.ndarray) -> None:
         """Do nothing: no quantity is counted within a step."""

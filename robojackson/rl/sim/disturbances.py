@@ -48,8 +48,9 @@ class Disturbances:
     """
 
     def __init__(self, config: RandomConfig, n: int, dt: float, seed: int | Sequence[int]) -> None:
-        self._noise, self._pushes, self._dt = config.sensor_noise, config.pushes, dt
-        self._seed, self._n = seed, n
+        self._dt, self._seed, self._n = dt, seed, n
+        share = config.shares(n)[:, None]
+        self._noise, self._pushes = share * config.sensor_noise, share * config.pushes
         self.count = np.zeros(1, int)
         self.push_at = self._waits(self._rng(0))
 
@@ -57,7 +58,7 @@ class Disturbances:
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
         """Return the states as noisy sensors measure them; constant within a control step."""
-        if not self._noise:
+        if not self._noise.any():
             return qpos, qvel
         rng = self._rng(1)
         qpos, qvel = qpos.copy(), qvel.copy()
@@ -78,7 +79,7 @@ class Disturbances:
     def after_step(self, datas: Sequence[mujoco.MjData], active: Bool[np.ndarray, " N"]) -> None:
         """Count a control step and push the robots whose push is due."""
         self.count += 1
-        if not self._pushes:
+        if not self._pushes.any():
             return
         due = self.push_at <= self.count[0]
         if not due.any():

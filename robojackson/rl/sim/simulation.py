@@ -123,10 +123,11 @@ class Simulation:
         if random != RandomConfig():
             rng = np.random.default_rng(seed)
             self._models = varied_models(replace(robot, model=model), random, n, rng)
-            factor = 1 + random.gains * rng.uniform(-1, 1, (n, 1))
+            share = random.shares(n)
+            factor = 1 + random.gains * share[:, None] * rng.uniform(-1, 1, (n, 1))
             self.kp, self.kd = self.kp * factor, self.kd * factor
             longest = min(round(random.delay / model.opt.timestep), control.substeps or 1)
-            self._delay = rng.integers(longest + 1, size=n)
+            self._delay = np.round(share * rng.integers(longest + 1, size=n)).astype(int)
         most = control.substeps or 1
         self._delay = np.minimum(self._delay + round(delay_s / model.opt.timestep), most)
         self._disturbances = Disturbances(random, n, self.dt, seed)

@@ -62,8 +62,11 @@ def varied_models(
 
     Where nothing of a model varies all have the robot's own: a copy with meshes takes 68 MB.
     """
-    friction, mass = (1 + width * rng.uniform(-1, 1, n) for width in (random.friction, random.mass))
-    com: Float[np.ndarray, "N 3"] = random.com * rng.uniform(-1, 1, (n, 3))
+    share = random.shares(n)
+    friction, mass = (
+        1 + share * width * rng.uniform(-1, 1, n) for width in (random.friction, random.mass)
+    )
+    com: Float[np.ndarray, "N 3"] = share[:, None] * random.com * rng.uniform(-1, 1, (n, 3))
     if not (random.friction or random.mass or random.com or random.integrators):
         return [robot.model] * n
     models = []

@@ -19,7 +19,7 @@ from robojackson.rl.evaluation.passport import (
     ROBUST,
     cases,
     passport,
-    robust_settings,
+    robust_ranges,
 )
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.modes.observation import Observer
@@ -147,5 +147,4 @@ def test_pushes_do_not_change_what_an_older_policys_actions_are(robot: Robot) ->
 
 
 def test_train_robust_disturbs_what_the_passport_tests() -> None:
-    config = load(TrainConfig, None, robust_settings())
-    assert config.track.random == ROBUST
+    assert load(TrainConfig, None, robust_ranges()).track.random == ROBUST

@@ -1,12 +1,13 @@
 """The onboard observation: only what a robot can measure; the critics alone see the rest."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.rl.config.train_config import TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.config.train_config import RandomConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
@@ -47,6 +48,26 @@ def test_where_a_robot_is_and_how_fast_it_travels_is_not_onboard(
     np.testing.assert_array_equal(first[:seen], second[:seen])
     assert not np.allclose(first[seen:], second[seen:]), "the critics see it"
     assert len(first) == observer.size
+
+
+def test_critics_see_the_state_without_the_noise_of_the_sensors(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """Asymmetric actor and critic (Pinto et al., 2018): noise is the policy's alone."""
+    kinds = {"onboard": True, "full": False}
+    for kind, clean in kinds.items():
+        random = RandomConfig(sensor_noise=1.0)
+        config = TrackConfig(observation=kind, random=random)  # type: ignore[arg-type]
+        noisy, exact = (
+            TrackingCore(robot, sway, one, 4, 0)
+            for one in (config, dataclasses.replace(config, random=RandomConfig()))
+        )
+        seen, known, size = noisy.reset(), exact.reset(), noisy.actor_size
+        assert (seen[:, :size] != known[:, :size]).any(axis=1).all(), kind
+        if clean:
+            np.testing.assert_array_equal(seen[:, size:], known[:, size:])
+        else:
+            assert size == seen.shape[1]
 
 
 def test_turning_robot_and_reference_together_changes_nothing_onboard(

@@ -56,6 +56,42 @@ def test_robots_share_a_model_where_nothing_of_it_varies(
     assert len({id(model) for model in found}) == models
 
 
+def test_graded_ranges_grow_from_the_stock_robot_to_whole_ones(robot: Robot) -> None:
+    """With the same random numbers robot i is i / (n - 1) as far from the stock robot."""
+    whole, graded = (
+        RandomConfig(friction=0.5, mass=0.1, gains=0.2, sensor_noise=1.0, least=least)
+        for least in (1.0, 0.0)
+    )
+    share = np.linspace(0, 1, N)
+    friction, mass = [], []
+    for random in (whole, graded):
+        models = varied_models(robot, random, N, np.random.default_rng(0))
+        friction.append([m.geom_friction[0, 0] / robot.model.geom_friction[0, 0] for m in models])
+        mass.append([m.body_mass.sum() / robot.model.body_mass.sum() for m in models])
+    for wide, narrow in (friction, mass):
+        np.testing.assert_allclose(np.array(narrow) - 1, share * (np.array(wide) - 1), atol=1e-12)
+    first, second = placed(robot, whole), placed(robot, graded)
+    stock = placed(robot, RandomConfig()).kp
+    np.testing.assert_allclose(second.kp - stock, share[:, None] * (first.kp - stock), atol=1e-12)
+    noise = [sim.sensed()[1] - sim.qvel for sim in (first, second)]
+    np.testing.assert_allclose(noise[1], share[:, None] * noise[0], atol=1e-12)
+
+
+def test_graded_pushes_and_delays_leave_the_first_robot_alone(robot: Robot) -> None:
+    calm, pushed = (placed(robot, RandomConfig(pushes=p, least=0.0)) for p in (0.0, 1.0))
+    hold = np.tile(robot.standing[7:][calm.motors.hinge], (N, 1))
+    for _ in range(int(3.2 / calm.dt)):
+        calm.step(hold)
+        pushed.step(hold)
+    apart = np.abs(pushed.qpos - calm.qpos).max(1)
+    assert apart[0] == 0
+    assert apart[1:].min() > 0
+    step = float(robot.model.opt.timestep)
+    late = [placed(robot, RandomConfig(delay=5 * step, least=least))._delay for least in (1, 0)]
+    np.testing.assert_array_equal(late[1], np.round(np.linspace(0, 1, N) * late[0]))
+    assert late[0].max() > 0
+
+
 def test_another_time_step_keeps_the_control_step(robot: Robot) -> None:
     fine = varied(robot, Variation(timestep=0.0015))
     assert fine.substeps == 10

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.cli import walker_training
+from robojackson.cli.learning import walker_training
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig

@@ -11,20 +11,17 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robojackson.cli import cards, console
+from robojackson.cli.learning.training_request import requested
 from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded, with_option
 from robojackson.cli.lifetime.parent_death import end_with_parent
-from robojackson.errors import BadConfiguration
-from robojackson.pipeline.yaml_loader import load
 
 if TYPE_CHECKING:
     from robojackson.api.trained_policy import TrainedPolicy
-    from robojackson.rl.config.train_config import TrainConfig
 
 log = logging.getLogger(__name__)
 
@@ -32,8 +29,6 @@ USUAL_MINUTES = 10.0
 """Advice for a training that ended before its first update."""
 RECENT = 100
 """Number of last episodes that describe a training."""
-SECTION = "train."
-"""Section of a pipeline's configuration with a training's keys."""
 PROGRESS = "progress.json"
 """Progress of a training, in its folder."""
 
@@ -85,45 +80,6 @@ def train(
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
     return _answer(trained, reference, out / "policy.safetensors")
-
-
-@dataclass(frozen=True)
-class Requested:
-    """The request of a command for a training.
-
-    Attributes:
-        train: The training's configuration.
-        setup: Name or file for the tables; None derives a name from the settings.
-        gate: Whether a motion that the robot cannot follow is refused.
-    """
-
-    train: "TrainConfig"
-    setup: str | None
-    gate: bool = True
-
-
-def requested(config: str | None, setup: str | None, overrides: Mapping[str, object]) -> Requested:
-    """Return the training that files, `--set` and options request; later ones override earlier
-    ones.
-
-    Raises:
-        UnknownName: no such file.
-        BadConfiguration: a wrong key or value; a setup beside a configuration.
-    """
-    from robojackson.api.policy_training import setup_file
-    from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.rl.config.train_config import TrainConfig
-
-    if config is None:
-        return Requested(load(TrainConfig, setup_file(setup), overrides), setup)
-    if setup is not None:
-        raise BadConfiguration(
-            f"--config {config} and --setup {setup}: give one; a configuration has a "
-            "setup's keys in its section `train`"
-        )
-    given = {f"{SECTION}{key.removeprefix(SECTION)}": value for key, value in overrides.items()}
-    whole = load(PipelineConfig, config, given)
-    return Requested(whole.train, None, whole.gate)
 
 
 def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str, Any]:

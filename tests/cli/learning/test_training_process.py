@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from robojackson.api import policy_training
-from robojackson.cli import training_process
+from robojackson.cli.learning import training_process, training_request
 from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
 from robojackson.errors import BadConfiguration, RejectedReference
@@ -86,7 +86,7 @@ def written(folder: Path, text: str) -> str:
 
 def test_a_configuration_of_dance_trains_with_its_section(tmp_path: Path) -> None:
     config = written(tmp_path, "train: {seed: 3, tqc: {batch: 64}}\n")
-    expected = training_process.requested(config, None, {})
+    expected = training_request.requested(config, None, {})
     assert (expected.train.seed, expected.train.tqc.batch, expected.gate) == (3, 64, True)
     assert expected.train == load(PipelineConfig, config).train
 
@@ -94,20 +94,20 @@ def test_a_configuration_of_dance_trains_with_its_section(tmp_path: Path) -> Non
 @pytest.mark.parametrize("key", ["seed", "train.seed"])
 def test_what_is_typed_wins_over_the_configuration(key: str, tmp_path: Path) -> None:
     config = written(tmp_path, "gate: false\ntrain: {seed: 3}\n")
-    expected = training_process.requested(config, None, {key: "4"})
+    expected = training_request.requested(config, None, {key: "4"})
     assert (expected.train.seed, expected.gate) == (4, False)
 
 
 def test_a_wrong_key_of_the_configuration_is_named_with_its_path(tmp_path: Path) -> None:
     config = written(tmp_path, "train: {tqc: {bach: 64}}\n")
     with pytest.raises(BadConfiguration, match=r"mine\.yaml: .*'train\.tqc\.bach'.*mean 'batch'"):
-        training_process.requested(config, None, {})
+        training_request.requested(config, None, {})
 
 
 def test_a_setup_beside_a_configuration_is_refused(tmp_path: Path) -> None:
     config = written(tmp_path, "train: {seed: 3}\n")
     with pytest.raises(BadConfiguration, match=r"--setup pretrain: give one"):
-        training_process.requested(config, "pretrain", {})
+        training_request.requested(config, "pretrain", {})
 
 
 def test_the_reward_audit_is_one_line() -> None:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robojackson.cli import stages, training_process
+from robojackson.cli import stages
+from robojackson.cli.learning import training_process
 from robojackson.errors import BadConfiguration
 from robojackson.files import tables
 from robojackson.files.file_tree import results_in

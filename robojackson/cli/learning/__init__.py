@@ -1,0 +1,1 @@
+"""What the commands of learning do: requests, the training process, walkers."""

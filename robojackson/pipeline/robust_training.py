@@ -1,0 +1,69 @@
+"""The settings of `--robust`: a training with varied physics, and a pass with its passport."""
+
+from collections.abc import Iterator, Mapping
+
+from robojackson.errors import BadConfiguration
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.evaluation.passport import robust_ranges
+from robojackson.robot.description import RobotDescription
+
+
+def robust_dance(config: str, given: Mapping[str, object]) -> dict[str, object]:
+    """Return the overrides of a robust pass; those that were given win.
+
+    Args:
+        config: Name or path of the pipeline's configuration, which names the robot.
+        given: Overrides by key path, as train.seed, or whole sections.
+
+    Raises:
+        BadConfiguration: `instant` or the mode `paper`; a wrong key or value.
+        UnknownName: no such robot or configuration.
+    """
+    settings = load(PipelineConfig, config, given)
+    if settings.instant:
+        raise BadConfiguration("instant=true trains nothing: leave out instant, or robust")
+    found = robust_training(settings.train, describe_robot(settings.robot))
+    trained = {f"train.{key}": value for key, value in found.items()}
+    return with_defaults({**trained, "evaluate.passport": True}, given)
+
+
+def robust_training(config: TrainConfig, description: RobotDescription) -> dict[str, object]:
+    """Return what `--robust` adds to a training's configuration: the ranges that it draws from.
+
+    On top of feedback a robot observes what it measures itself, unless the training starts from
+    other networks or has another observation: noise of a root that the feedback takes for exact
+    costs it more than the estimate (docs/learning_g1.md, "Robust").
+
+    Raises:
+        BadConfiguration: the mode `paper`, whose physics does not vary.
+    """
+    if config.mode == "paper":
+        raise BadConfiguration("mode=paper has no varied physics: use mode track, or not robust")
+    track, control = config.track, config.track.control
+    share = description.feedback if control.feedback is None else control.feedback
+    fed = share > 0 and control.law == "pd" and control.root_state != "exact"
+    usual = track.observation == "full" and config.start == "scratch"
+    ranges: dict[str, object] = robust_ranges()
+    return ranges | ({"track.observation": "onboard"} if fed and usual else {})
+
+
+def with_defaults(added: Mapping[str, object], given: Mapping[str, object]) -> dict[str, object]:
+    """Return overrides in the order in which they apply: given sections, then what is added to
+    them unless they say otherwise, then the other given ones."""
+    said = set(_leaves(given))
+    new = {key: value for key, value in added.items() if key not in said}
+    above = {key for key in given if any(one.startswith(f"{key}.") for one in new)}
+    sections = {key: value for key, value in given.items() if key in above}
+    return {**sections, **new, **{key: given[key] for key in given if key not in above}}
+
+
+def _leaves(values: Mapping[str, object], above: str = "") -> Iterator[str]:
+    """Yield the key paths of all values."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}"

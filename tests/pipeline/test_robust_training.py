@@ -1,0 +1,36 @@
+"""The settings of `--robust` and the order in which they apply."""
+
+from pathlib import Path
+
+import pytest
+
+from robojackson.api.robots import load_robot
+from robojackson.cli.learning.training_request import requested, robust
+from robojackson.errors import BadConfiguration
+from robojackson.pipeline.robust_training import with_defaults
+from robojackson.rl.evaluation.passport import ROBUST
+from tests.fixtures.deploy_policies import swaying
+
+
+def test_sections_come_first_then_what_is_added_then_the_rest() -> None:
+    added = {"a.b": 1, "c.d": 2, "e": 3}
+    given = {"c.d": 9, "a": {"x": 7}, "f": 8}
+    assert list(with_defaults(added, given).items()) == [
+        ("a", {"x": 7}), ("a.b", 1), ("e", 3), ("c.d", 9), ("f", 8)
+    ]  # fmt: skip
+    assert with_defaults(added, {"a": {"b": 5}}) == {"a": {"b": 5}, "c.d": 2, "e": 3}
+
+
+@pytest.mark.parametrize(("robot", "observation"), [(None, "full"), ("g1", "onboard")])
+def test_a_robust_training_is_that_of_the_motion_s_robot_or_of_the_named_one(
+    tmp_path: Path, robot: str | None, observation: str
+) -> None:
+    reference = tmp_path / "reference.parquet"
+    swaying(load_robot("humanoid")).save(reference)
+    found = robust(reference, robot, None, None, {"seed": 3, "track.random.mass": 0.2})
+    train = requested(None, None, found).train
+    assert train.seed == 3
+    assert (train.track.random.mass, train.track.random.pushes) == (0.2, ROBUST.pushes)
+    assert train.track.observation == observation
+    with pytest.raises(BadConfiguration, match="mode=paper"):
+        robust(reference, robot, None, None, {"mode": "paper"})
