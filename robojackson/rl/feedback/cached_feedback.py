@@ -45,6 +45,9 @@ ROUNDED, SINGLE = ("gain", "offset"), np.float32
 """Arrays that are kept in single precision."""
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
+NAMED_FACTOR = 4.0
+"""`robust_action_factor` by which gains are named, which do not depend on it: that of the G1 when
+the first were kept."""
 LARGEST = 2.0
 """Largest offset of a target by the feedback, in full actions of a policy: small enough that a
 policy of a few minutes can correct it."""
@@ -144,9 +147,9 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
     motors = actuation_facts(robot, control)
     del motors["action_scale"]  # of the policy: the feedback is bounded by the robot's own
+    described = replace(robot.description, robust_action_factor=NAMED_FACTOR)
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
-             motors, settings(), description_sha256(robot.description),
-             robot.contact_names]  # fmt: skip
+             motors, settings(), description_sha256(described), robot.contact_names]  # fmt: skip
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode())

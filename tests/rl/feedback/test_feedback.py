@@ -145,7 +145,9 @@ def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
     again = cached_feedback.feedback_of(robot, [sway], FED)
     assert cached_feedback.feedback_of(robot, [sway], dataclasses.replace(FED, action_factor=4.0))
     assert not calls, "the range of a policy's actions does not change the feedback"
-    here = dataclasses.replace(robot.description, file="/a/robot.yaml", mjcf="/a/model.xml")
+    here = dataclasses.replace(
+        robot.description, file="/a/robot.yaml", mjcf="/a/model.xml", robust_action_factor=3.0
+    )
     assert cached_feedback.feedback_of(dataclasses.replace(robot, description=here), [sway], FED)
     assert not calls, "the place of a robot's file does not change the feedback"
     assert kept is not None
