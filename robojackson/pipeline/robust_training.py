@@ -12,7 +12,8 @@ from robojackson.robot.description import RobotDescription
 
 
 def robust_dance(config: str, given: Mapping[str, object]) -> dict[str, object]:
-    """Return the overrides of a robust pass; those that were given win.
+    """Return the overrides of a robust pass, recorded as the setup `robust`; those that were given
+    win.
 
     Args:
         config: Name or path of the pipeline's configuration, which names the robot.
@@ -27,7 +28,7 @@ def robust_dance(config: str, given: Mapping[str, object]) -> dict[str, object]:
         raise BadConfiguration("instant=true trains nothing: leave out instant, or robust")
     found = robust_training(settings.train, describe_robot(settings.robot))
     trained = {f"train.{key}": value for key, value in found.items()}
-    return with_defaults({**trained, "evaluate.passport": True}, given)
+    return with_defaults({**trained, "setup": "robust", "evaluate.passport": True}, given)
 
 
 def robust_training(config: TrainConfig, description: RobotDescription) -> dict[str, object]:

@@ -71,10 +71,11 @@ def test_a_robust_dance_varies_the_physics_and_gets_a_passport(
     assert (usual.train.track.random, usual.evaluate.passport) == (RandomConfig(), False)
     assert (found.train.track.random, found.evaluate.passport) == (ROBUST, True)
     assert found.train.track.observation == observation
-    own = {"train.track.random.pushes": 0.5, "train.track.observation": "preview"}
+    assert (usual.setup, found.setup) == ("scratch", "robust")
+    own = {"train.track.random.pushes": 0.5, "train.track.observation": "preview", "setup": "mine"}
     chosen = settings_of(robot=robot, robust=True, overrides=own)
     assert chosen.train.track.random == replace(ROBUST, pushes=0.5)
-    assert chosen.train.track.observation == "preview"
+    assert (chosen.train.track.observation, chosen.setup) == ("preview", "mine")
 
 
 def test_whole_sections_among_the_overrides_leave_a_dance_robust(
