@@ -61,13 +61,22 @@ def robot_of(reference: ReferenceMotion) -> Robot:
         UnknownName: its description is missing; the message names the option.
         RejectedReference: its model has changed since.
     """
+    return require_robot(reference, bind_robot(description_of(reference)))
+
+
+def description_of(reference: ReferenceMotion) -> RobotDescription:
+    """Return the description of the robot that a reference motion was made for.
+
+    Raises:
+        UnknownName: it is missing; the message names the option.
+    """
     name, file = reference.robot, reference.robot_file
     if file and not Path(file).is_file():
         where = f"the motion was made for {file}, which is not on {platform.node()}"
     elif not file and name not in robot_names():
         where = "the motion does not name its description"
     else:
-        return require_robot(reference, bind_robot(describe_robot(file or name)))
+        return describe_robot(file or name)
     advice = f"{where}; give --robot FILE, in Python robot="
     raise UnknownName("robot", name, advice, robot_names())
 

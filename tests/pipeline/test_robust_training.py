@@ -1,12 +1,14 @@
 """The settings of `--robust` and the order in which they apply."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from robojackson.api.robots import load_robot
 from robojackson.cli.learning.training_request import requested, robust
-from robojackson.errors import BadConfiguration
+from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.robust_training import with_defaults
 from robojackson.rl.evaluation.passport import ROBUST
 from tests.fixtures.deploy_policies import swaying
@@ -32,5 +34,10 @@ def test_a_robust_training_is_that_of_the_motion_s_robot_or_of_the_named_one(
     assert train.seed == 3
     assert (train.track.random.mass, train.track.random.pushes) == (0.2, ROBUST.pushes)
     assert train.track.observation == observation
+    made_elsewhere = replace(ReferenceMotion.load(reference), robot_file="/gone/robot.yaml")
+    made_elsewhere.save(tmp_path / "gone.parquet")
+    if robot is None:
+        with pytest.raises(UnknownName, match=r"made for /gone/robot\.yaml.*give --robot FILE"):
+            robust(tmp_path / "gone.parquet", robot, None, None, {})
     with pytest.raises(BadConfiguration, match="mode=paper"):
         robust(reference, robot, None, None, {"mode": "paper"})

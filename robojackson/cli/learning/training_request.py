@@ -62,11 +62,12 @@ def robust(
     given: Mapping[str, object],
 ) -> dict[str, object]:
     """Return the overrides of `train --robust`, for `robot` or that of the motion."""
+    from robojackson.api.arguments import description_of
     from robojackson.motion.reference_motion import ReferenceMotion
     from robojackson.pipeline.robot_descriptions import describe_robot
     from robojackson.pipeline.robust_training import robust_training, with_defaults
 
     motion = ReferenceMotion.load(reference)
-    description = describe_robot(robot or motion.robot_file or motion.robot)
+    description = describe_robot(robot) if robot else description_of(motion)
     train = requested(config, setup, given).train
     return with_defaults(robust_training(train, description), given)
