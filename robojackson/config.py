@@ -5,6 +5,7 @@ integer and `1` no boolean. What YAML and JSON cannot express is converted to th
 list for a tuple, a mapping for a section, text for a path.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from functools import reduce
 from operator import or_
@@ -58,3 +59,12 @@ def _strict(kind: Any) -> Any:
     if origin in (tuple, dict, list):
         return origin[tuple(each if each is ... else _strict(each) for each in inner)]
     return kind
+
+
+def leaves(values: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the key paths of all values that are no sections, with the values."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value

@@ -19,6 +19,7 @@ from rich.table import Table
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.policies import MOVES, Folders, load, must, reference_of, source_of
 from benchmarks.learning.training_rows import STEPS_A_MINUTE
+from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import poses_sha256
 from robojackson.pipeline.folder_lock import locked
 from robojackson.rl.evaluation.passport import LEAST_SHARE
@@ -97,9 +98,8 @@ def _keep(path: Path, row: dict[str, Any]) -> None:
     with locked(path.parent, "robust.lock", patience_s=60.0, holder="another row"):
         rows = [*_rows(path), row]
         rows.sort(key=lambda one: (list(MOVES).index(one["move"]), one["seed"]))
-        part = path.with_suffix(".part")
-        part.write_text(json.dumps({"least_kept": LEAST_SHARE, "rows": rows}, indent=1) + "\n")
-        part.replace(path)
+        text = json.dumps({"least_kept": LEAST_SHARE, "rows": rows}, indent=1) + "\n"
+        FileTree(path.parent).write(path.name, text.encode())
 
 
 def _show(rows: list[dict[str, Any]]) -> None:

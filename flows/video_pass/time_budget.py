@@ -37,5 +37,5 @@ def training_time(
     )
     after_s = evaluation_s + PAGE_S + PICTURE_S * settings.render.fps * shown_s
     track = settings.train.track
-    fed = feedback_share(machine, control_of(track)) > 0 and not track.random.pushes
+    fed = feedback_share(robot, control_of(track)) > 0 and not track.random.pushes
     return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion, fed))

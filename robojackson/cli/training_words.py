@@ -1,11 +1,11 @@
 """The command that continues a training, with the settings in the training's folder."""
 
 import json
-from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
 from robojackson.cli import cards
+from robojackson.config import leaves
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
@@ -40,21 +40,13 @@ def _unusual(folder: Path) -> list[str]:
     checkpoint = newest_checkpoint(folder)
     if checkpoint is None:
         return []
-    usual = dict(_flat(json.loads(json.dumps(asdict(TrainConfig())))))
-    own = _flat(json.loads((checkpoint / "run.json").read_text())["configuration"])
+    usual = dict(leaves(json.loads(json.dumps(asdict(TrainConfig())))))
+    own = leaves(json.loads((checkpoint / "run.json").read_text())["configuration"])
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
         for key, value in own
         if key in usual and usual[key] != value
     ]
-
-
-def _flat(values: Mapping[str, object], above: str = "") -> Iterator[tuple[str, object]]:
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
 
 
 def is_fed_onboard(policy: Path) -> bool:

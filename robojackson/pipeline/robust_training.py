@@ -1,13 +1,15 @@
 """The settings of `--robust`: a training with varied physics, and a pass with its passport."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
+from robojackson.config import leaves
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.evaluation.passport import robust_ranges
+from robojackson.rl.sim.motors import feedback_share
 from robojackson.robot.description import RobotDescription
 
 
@@ -44,8 +46,11 @@ def robust_training(config: TrainConfig, description: RobotDescription) -> dict[
     if config.mode == "paper":
         raise BadConfiguration("mode=paper has no varied physics: use mode track, or not robust")
     track, control = config.track, config.track.control
-    share = description.feedback if control.feedback is None else control.feedback
-    fed = share > 0 and control.law == "pd" and control.root_state != "exact"
+    fed = (
+        feedback_share(description, control) > 0
+        and control.law == "pd"
+        and control.root_state != "exact"
+    )
     usual = track.observation == "full" and config.start == "scratch"
     ranges: dict[str, object] = robust_ranges()
     return ranges | ({"track.observation": "onboard"} if fed and usual else {})
@@ -54,17 +59,8 @@ def robust_training(config: TrainConfig, description: RobotDescription) -> dict[
 def with_defaults(added: Mapping[str, object], given: Mapping[str, object]) -> dict[str, object]:
     """Return overrides in the order in which they apply: given sections, then what is added to
     them unless they say otherwise, then the other given ones."""
-    said = set(_leaves(given))
+    said = {key for key, _ in leaves(given)}
     new = {key: value for key, value in added.items() if key not in said}
     above = {key for key in given if any(one.startswith(f"{key}.") for one in new)}
     sections = {key: value for key, value in given.items() if key in above}
     return {**sections, **new, **{key: given[key] for key in given if key not in above}}
-
-
-def _leaves(values: Mapping[str, object], above: str = "") -> Iterator[str]:
-    """Yield the key paths of all values."""
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}"

@@ -16,7 +16,7 @@ from pathlib import Path
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.config.tqc_config import PRESETS
-from robojackson.rl.config.track_config import RandomConfig, TrackConfig
+from robojackson.rl.config.track_config import RandomConfig
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
@@ -79,7 +79,7 @@ def train_policy(
         if not run.finished():
             trainer.learn(run.callback)
     except BudgetSpent:
-        run.checkpoint(_choice(tqc, reference, robot, core))
+        run.checkpoint(_choice(tqc, config, reference, robot, core))
     finally:
         env.close()
     return run.result()
@@ -87,16 +87,16 @@ def train_policy(
 
 def _choice(
     tqc: TqcConfig,
+    config: TrainConfig,
     reference: ReferenceMotion | Sequence[ReferenceMotion],
     robot: Robot,
     core: TrackingCore,
 ) -> Choice:
     """Return what a polish is written by: the policy or, if that holds more, the feedback alone."""
-    motions, track = motions_of(reference), core.config
-    disturbed = isinstance(track, TrackConfig) and track.random != RandomConfig()
+    motions, threads = motions_of(reference), core.config.threads
+    disturbed = config.track.random != RandomConfig()
     if not tqc.zero_init or len(motions) > 1 or disturbed:
         return as_trained
-    threads = track.threads
     return partial(better_of, reference=motions[0], robot=robot, clip=core.clip, threads=threads)
 
 
@@ -138,7 +138,8 @@ def polishes(
     track, motions = config.track, motions_of(reference)
     control = control_of(track)
     usual = config.mode == "track" and config.trainer == "sbx" and config.start == "scratch"
-    fed = feedback_share(robot, control) > 0 and feedback_path(robot, control) == "sampled"
+    share = feedback_share(robot.description, control)
+    fed = share > 0 and feedback_path(robot, control) == "sampled"
     better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)
     chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
     return usual and chosen and control.law == "pd" and fed and better

@@ -64,7 +64,7 @@ def feedback_of(
     Args:
         progress: Called with a name, the steps that are done, and all; log lines without it.
     """
-    share = feedback_share(robot, control)
+    share = feedback_share(robot.description, control)
     if not share or control.law != "pd":
         return None
     found = [_cached(robot, motion, control, progress) for motion in references]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.robot.description import FeedbackPath
+from robojackson.robot.description import FeedbackPath, RobotDescription
 from robojackson.robot.model import Robot
 
 
@@ -78,11 +78,11 @@ def feedforward_share(robot: Robot, control: ControlConfig) -> float:
     return robot.description.feedforward if named is None else named
 
 
-def feedback_share(robot: Robot, control: ControlConfig) -> float:
+def feedback_share(description: RobotDescription, control: ControlConfig) -> float:
     """Return the share of the linear feedback along the reference that the targets get: the robot's
     own, unless the configuration has one."""
     named = control.feedback
-    return robot.description.feedback if named is None else named
+    return description.feedback if named is None else named
 
 
 def feedback_path(robot: Robot, control: ControlConfig) -> FeedbackPath:

@@ -55,7 +55,7 @@ def resolved(
     defaults."""
     pushed = random is not None and random.pushes > 0
     usual = robot.description.robust_action_factor if pushed else 1.0
-    share = feedback_share(robot, control)
+    share = feedback_share(robot.description, control)
     return replace(
         control,
         substeps=control.substeps or robot.substeps,
