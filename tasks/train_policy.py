@@ -19,8 +19,10 @@ import yaml
 
 from robojackson.files.json_types import to_json_types
 from robojackson.files.local_folder import sha256_of_file
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.modes.track_mode import is_fed
 from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
 from storage.store import Store
@@ -40,8 +42,9 @@ BUDGET = "training gets %.1f of %g min; dances of this length need about %.0f"
 """Log line about the budget, which the bar of `robojackson dance` shows as well."""
 DIGITS = 12
 """Of the digest in a run id."""
-OVERTIME_S = 300.0
-"""What a training may take beyond its budget: start, compilation, last checkpoint."""
+OVERTIME_S, SEARCH_S_A_SECOND = 300.0, 60.0
+"""What a training may take beyond its budget: start, compilation, last checkpoint; and, on a robot
+with feedback, for its search along each second of the motion (docs/learning_g1.md)."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ async def train_policy(
     with locked(work, "task.lock", A_MOMENT), store.local(reference) as path:
         minutes = _minutes(config, time_left, whole_pass)
         if minutes is not None:
-            limit_s = min(limit_s or math.inf, 60 * minutes + OVERTIME_S)
+            limit_s = min(limit_s or math.inf, 60 * minutes + _overtime_s(path, robot, config))
         command = _command(path, work, robot, config, labels, run_id, minutes)
         async with show_progress(work, f"{labels.setup}-{labels.move}-s{config.seed}"):
             answer = await run_process(command, run_id, work, limit_s)
@@ -133,6 +136,14 @@ def _start(config: TrainConfig, robot: RobotDescription) -> list[str]:
     """Return the digest of the networks that it starts from, if it does."""
     path = local_start_file(Store.from_environment(), config, robot)
     return [] if path is None else [sha256_of_file(path)]
+
+
+def _overtime_s(reference: Path, robot: RobotDescription, config: TrainConfig) -> float:
+    """Return what a training may take beyond its budget before it counts as hung, seconds."""
+    if not is_fed(config, robot):
+        return OVERTIME_S
+    motion = ReferenceMotion.load(reference)
+    return OVERTIME_S + SEARCH_S_A_SECOND * len(motion) * motion.dt
 
 
 def _minutes(config: TrainConfig, time_left: TrainingTime | None, whole_pass: bool) -> float | None:

@@ -3,8 +3,7 @@
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.rl.evaluation.duration import minutes_needed, seconds_to_evaluate
-from robojackson.rl.modes.track_mode import control_of
-from robojackson.rl.sim.motors import feedback_share
+from robojackson.rl.modes.track_mode import is_fed
 from robojackson.robot.model import RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -36,6 +35,6 @@ def training_time(
         max(settings.evaluate.seconds, len(motion) * motion.dt), settings.render.max_seconds
     )
     after_s = evaluation_s + PAGE_S + PICTURE_S * settings.render.fps * shown_s
-    track = settings.train.track
-    fed = feedback_share(robot, control_of(track)) > 0 and not track.random.pushes
-    return TrainingTime(began + 60 * settings.minutes - after_s, minutes_needed(motion, fed))
+    train = settings.train
+    needed = minutes_needed(motion, is_fed(train, robot) and not train.track.random.pushes)
+    return TrainingTime(began + 60 * settings.minutes - after_s, needed)

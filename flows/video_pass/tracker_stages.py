@@ -141,7 +141,9 @@ def track(
     title = TITLE.format(tracker.name)
     film = render_video(*shown, look["rollout"], robot, settings.render, title, FILM)
     announce("evaluation")
-    whole = evaluate_tracker(tracker, reference, robot, settings.evaluate, labels)
+    evaluation = settings.evaluate  # a training that follows has the passport
+    how = evaluation if settings.instant else replace(evaluation, passport=False)
+    whole = evaluate_tracker(tracker, reference, robot, how, labels)
     made |= {**whole, "rollout": look["rollout"], "dance": film, "still": draw_snapshot(film)}
     if page is not None and not settings.instant:  # a training follows, which takes minutes
         write_early_page(made, best.name, shown_with, folder, again=True)

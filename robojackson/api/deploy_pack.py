@@ -1,5 +1,6 @@
 """Write a deploy pack: a folder that runs a trained policy without RoboJackson."""
 
+import logging
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
 from robojackson.api.feedback_pack import deployed_feedback
 from robojackson.api.pack_parts import (
+    EVALUATION,
     REFERENCE,
     beside,
     evaluation_in,
@@ -18,7 +20,7 @@ from robojackson.api.pack_parts import (
 )
 from robojackson.api.policy_ingredients import policy_ingredients
 from robojackson.api.robots import load_robot
-from robojackson.errors import BadPolicy
+from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.formats.deploy.deployed_policy import (
     DeployedPolicy,
     chain_between,
@@ -32,10 +34,12 @@ from robojackson.rl.evaluation.controllers import control_of
 from robojackson.rl.feedback.nominal_path import Progress, no_progress
 from robojackson.rl.modes.observation import CLIP, HINGE_SPEED_SCALE, SPEED_SCALE
 from robojackson.rl.policy import Policy, load_policy
-from robojackson.rl.policy_facts import mode_of, observation_of, recorded_law
+from robojackson.rl.policy_facts import mode_of, networks_sha256, observation_of, recorded_law
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.robot.model import Robot
+
+log = logging.getLogger(__name__)
 
 LAST_ACTION_SCALE = 0.5
 """As in the observation of mode `track`."""
@@ -83,7 +87,7 @@ def write_deploy_pack(
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
-    evaluated = evaluation_in(path.parent, evaluation)
+    evaluated = _evaluation_of(found, path, evaluation)
     feedback, control = None, control_of(found, machine)
     if control.feedback:
         feedback = deployed_feedback(control, motion, machine, progress, found)
@@ -91,6 +95,29 @@ def write_deploy_pack(
     written = write_pack(Path(folder), files, ingredients, evaluated)
     layout = {"observations": parts.observation_size, "layout_sha256": parts.layout_sha256}
     return {"robot": motion.robot, **layout, **written}
+
+
+def _evaluation_of(policy: Policy, path: Path, given: FilePath | None) -> Figures | None:
+    """Return the evaluation of a policy that is given or lies beside it; None where neither is of
+    these networks.
+
+    Raises:
+        StoreError, BadConfiguration: the given file is missing, or of a tracker or other networks.
+    """
+    found = evaluation_in(path.parent, given)
+    if found is None:
+        return None
+    own = networks_sha256(policy)
+    if "tracker" not in found and found.get("networks_sha256", own) == own:
+        return found
+    reason = (
+        f"{given or path.parent / EVALUATION} is not an evaluation of {path} as it is now: make "
+        f"one with `robojackson evaluate {path} REFERENCE --passport -o DIR`"
+    )
+    if given is not None:
+        raise BadConfiguration(reason)
+    log.warning("no figures in the pack: %s", reason)
+    return None
 
 
 def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) -> DeployedPolicy:

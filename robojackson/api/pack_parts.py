@@ -12,6 +12,7 @@ from robojackson.files.file_tree import results_in
 from robojackson.files.foreign_file import read_json
 from robojackson.formats.deploy.deployed_machine import DeployedMachine, places_in_mjcf
 from robojackson.formats.deploy.licence_passport import Ingredient, together
+from robojackson.formats.deploy.pack_files import OF_SOME
 from robojackson.formats.deploy.pack_readme import Figures
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
@@ -20,6 +21,7 @@ from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 
 REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
+SETTINGS = "deploy.yaml"
 
 
 def motor_of_hinge(robot: Robot) -> Int[np.ndarray, " J"]:
@@ -97,14 +99,18 @@ def write_pack(
     ingredients: list[Ingredient],
     evaluation: Figures | None,
 ) -> Figures:
-    """Write the files of a pack; return what was written, its passport and its licences.
+    """Write the files of a pack, in place of those of an earlier one; return what was written, its
+    passport and its licences.
 
     Raises:
         StoreError: they cannot be written.
     """
+    replaces = (folder / SETTINGS).is_file()
     with results_in(folder) as tree:
         for name, content in files.items():
             tree.write(name, content)
+        for name in OF_SOME - set(files) if replaces else ():
+            tree.remove(name)
     rows = (evaluation or {}).get("passport") or []
     weakest = min(rows, key=_strict_of, default=None)
     return {

@@ -11,6 +11,7 @@ from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import load_policy
 from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
+from robojackson.rl.training_task import completed_settings
 
 
 def train_this(reference: Path) -> str:
@@ -41,7 +42,8 @@ def _unusual(folder: Path) -> list[str]:
     if checkpoint is None:
         return []
     usual = dict(leaves(json.loads(json.dumps(asdict(TrainConfig())))))
-    own = leaves(json.loads((checkpoint / "run.json").read_text())["configuration"])
+    kept = json.loads((checkpoint / "run.json").read_text())["configuration"]
+    own = leaves(completed_settings(kept))
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
         for key, value in own

@@ -6,10 +6,10 @@ from robojackson.config import leaves
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.yaml_loader import load, parsed_overrides
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.evaluation.passport import robust_ranges
-from robojackson.rl.sim.motors import feedback_share
+from robojackson.rl.modes.track_mode import is_fed
 from robojackson.robot.description import RobotDescription
 
 
@@ -45,12 +45,8 @@ def robust_training(config: TrainConfig, description: RobotDescription) -> dict[
     """
     if config.mode == "paper":
         raise BadConfiguration("mode=paper has no varied physics: use mode track, or not robust")
-    track, control = config.track, config.track.control
-    fed = (
-        feedback_share(description, control) > 0
-        and control.law == "pd"
-        and control.root_state != "exact"
-    )
+    track = config.track
+    fed = is_fed(config, description) and track.control.root_state != "exact"
     usual = track.observation == "full" and config.start == "scratch"
     ranges: dict[str, object] = robust_ranges()
     return ranges | ({"track.observation": "onboard"} if fed and usual else {})
@@ -58,8 +54,8 @@ def robust_training(config: TrainConfig, description: RobotDescription) -> dict[
 
 def with_defaults(added: Mapping[str, object], given: Mapping[str, object]) -> dict[str, object]:
     """Return overrides in the order in which they apply: given sections, then what is added to
-    them unless they say otherwise, then the other given ones."""
-    said = {key for key, _ in leaves(given)}
+    them unless they say otherwise, then the other given ones. Text is read as YAML."""
+    said = {key for key, _ in leaves(parsed_overrides(given))}
     new = {key: value for key, value in added.items() if key not in said}
     above = {key for key in given if any(one.startswith(f"{key}.") for one in new)}
     sections = {key: value for key, value in given.items() if key in above}

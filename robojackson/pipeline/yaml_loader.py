@@ -49,10 +49,7 @@ def load(
     """
     path = None if name_or_path is None else find(name_or_path)
     values, places = _read_extended(path) if path else ({}, {})
-    given = {
-        key_path: _parsed(value, f"--set {key_path}")
-        for key_path, value in (overrides or {}).items()
-    }
+    given = parsed_overrides(overrides or {})
     for key_path, value in given.items():
         _set(values, key_path.split("."), value)
     where = _display_name(path) if path else "--set"
@@ -67,6 +64,15 @@ def load(
             named = [g for g in blamed if g.startswith(in_question)]
             where = f"--set {', '.join(named or blamed)}"
         raise refusal(cls, cause, where) from cause
+
+
+def parsed_overrides(overrides: Mapping[str, object]) -> dict[str, object]:
+    """Return overrides whose text is read as YAML.
+
+    Raises:
+        BadConfiguration: a text is no YAML.
+    """
+    return {key: _parsed(value, f"--set {key}") for key, value in overrides.items()}
 
 
 def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config:

@@ -1,7 +1,9 @@
 """Facts of a policy's training, checked against the robot that it will drive."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TypeVar, get_args
 
 import numpy as np
@@ -12,7 +14,7 @@ from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.observation import Kind, Observer
-from robojackson.rl.policy import Policy
+from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.sim.motors import Motors, actuation_facts
 from robojackson.rl.sim.stock_humanoid import stock_observation_size
 from robojackson.robot.model import Robot
@@ -74,6 +76,24 @@ def is_of_another_path(policy: Policy, outline: Float[np.ndarray, "M J"] | None)
     if [len(row) for row in then] != [len(row) for row in outline]:
         return True
     return bool(np.abs(np.array(then) - outline).max() > SAME_PATH_RAD)
+
+
+def require_same_path(trained: Path, outline: Float[np.ndarray, "M J"] | None) -> None:
+    """Raise where a training would go on along another path than its policy was trained on.
+
+    Raises:
+        BadPolicy: `trained`, the policy so far, is of another path, or no policy.
+    """
+    if trained.is_file() and is_of_another_path(load_policy(trained), outline):
+        raise BadPolicy(f"{trained}: {OTHER_PATH}, in another folder")
+
+
+def networks_sha256(policy: Policy) -> str:
+    """Return a digest of a policy's weights."""
+    digest = hashlib.sha256()
+    for array in (array for layer in policy.layers for array in layer):
+        digest.update(f"{array.shape}".encode() + np.asarray(array, np.float32).tobytes())
+    return digest.hexdigest()
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:

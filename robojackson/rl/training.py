@@ -20,9 +20,10 @@ from robojackson.rl.config.track_config import RandomConfig
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
-from robojackson.rl.evaluation.polish_choice import better_of
+from robojackson.rl.evaluation.polish_choice import BESIDE, better_of
 from robojackson.rl.feedback.sampled_regulator import ENOUGH
 from robojackson.rl.modes.track_mode import control_of
+from robojackson.rl.policy import load_policy
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path, feedback_share
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
@@ -75,14 +76,24 @@ def train_policy(
     if networks is not None:
         trainer.start_from(chosen(networks, config.start_critics).tensors)
     run.bind(trainer)
+    choice = _choice(tqc, config, reference, robot, core)
     try:
         if not run.finished():
             trainer.learn(run.callback)
+        elif choice is not as_trained and not _is_chosen(out):
+            run.checkpoint(choice)
     except BudgetSpent:
-        run.checkpoint(_choice(tqc, config, reference, robot, core))
+        run.checkpoint(choice)
     finally:
         env.close()
     return run.result()
+
+
+def _is_chosen(out: Path) -> bool:
+    """Return whether a polish whose budget is used up was tried beside the feedback alone; not
+    where it was stopped in its last moment."""
+    policy = out / "policy.safetensors"
+    return policy.is_file() and BESIDE in load_policy(policy).facts
 
 
 def _choice(

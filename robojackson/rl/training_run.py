@@ -22,7 +22,7 @@ from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
-from robojackson.rl.policy_facts import outline_facts
+from robojackson.rl.policy_facts import outline_facts, require_same_path
 from robojackson.rl.tensorboard_log import ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
@@ -71,6 +71,7 @@ class Run:
         with checkpoint_folder.restoring(folder):
             state = json.loads((folder / "run.json").read_text())
             self.task.require_same(state["configuration"], self._identity(), folder)
+            require_same_path(self.out / "policy.safetensors", self.core.clip.outline)
             trainer.load(folder, self._replay, state["steps"], state["updates"])
             with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
                 self.core.restore(dict(arrays))

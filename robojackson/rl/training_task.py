@@ -78,16 +78,19 @@ class Task:
         task, tqc, track = (part if isinstance(part, dict) else {} for part in parts)
         if not (task and tqc and track):
             return {}
-        return {
-            **kept,
-            "task": {**json.loads(json.dumps(asdict(self))), **task},
-            "tqc": {**OLDER_TQC, **tqc},
-            "track": {
-                **track,
-                "control": _older_control(track),
-                "random": {**OLDER_RANDOM, **track.get("random", {})},
-            },
-        }
+        settings = completed_settings(kept)
+        return {**settings, "task": {**json.loads(json.dumps(asdict(self))), **task}}
+
+
+def completed_settings(kept: Mapping[str, Any]) -> dict[str, object]:
+    """Return the configuration of a checkpoint with the settings of then that older ones did not
+    keep."""
+    tqc, track = kept.get("tqc"), kept.get("track")
+    if not isinstance(tqc, dict) or not isinstance(track, dict):
+        return dict(kept)
+    random = {**OLDER_RANDOM, **track.get("random", {})}
+    control = {"control": _older_control(track)}
+    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**track, **control, "random": random}}
 
 
 def _older_control(track: Mapping[str, Any]) -> dict[str, object]:

@@ -5,9 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.api.deploy_pack import write_deploy_pack
+from robojackson.api.pack_parts import write_pack
 from robojackson.cli.exporting import PackInputs, export, licences_from
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
-from robojackson.rl.policy import Policy
+from robojackson.formats.deploy.licence_passport import Ingredient
+from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import networks_sha256
 from tests.fixtures.commands import in_process, robojackson
 from tests.fixtures.deploy_policies import random_policy, swaying
 from tests.fixtures.robots import stock
@@ -59,6 +63,36 @@ def test_an_evaluation_beside_the_policy_brings_its_passport(folder: Path) -> No
     (folder / "evaluation.json").write_text(json.dumps({"success": 1.0, "passport": cases(1.0)}))
     made = export(folder / "policy.safetensors", "deploy", folder / "pack", pack=inputs)
     assert made["verdict"]["kind"] == "written"
+
+
+@pytest.mark.parametrize("whose", [{"tracker": "regulator"}, {"networks_sha256": "0" * 64}])
+def test_an_evaluation_of_a_tracker_or_of_other_networks_is_not_in_the_pack(
+    folder: Path, whose: dict[str, str]
+) -> None:
+    policy, pack = folder / "policy.safetensors", folder / "pack"
+    found = {"success": 1.0, "passport": cases(0.75), **whose}
+    (folder / "evaluation.json").write_text(json.dumps(found))
+    made = export(policy, "deploy", pack, pack=PackInputs(licences={}))
+    assert "no sim-to-sim passport" in made["verdict"]["sentence"]
+    with pytest.raises(BadConfiguration, match="not an evaluation of"):
+        write_deploy_pack(policy, pack, evaluation=folder / "evaluation.json")
+    found["networks_sha256"] = networks_sha256(load_policy(policy))
+    found.pop("tracker", None)
+    (folder / "evaluation.json").write_text(json.dumps(found))
+    made = write_deploy_pack(policy, pack, evaluation=folder / "evaluation.json")
+    assert made["passport_cases"] == 2
+
+
+def test_a_pack_takes_the_place_of_another(folder: Path) -> None:
+    pack = folder / "pack"
+    for name in ("policy_obs.onnx", "passport.json", "own_notes.txt"):
+        (pack / name).parent.mkdir(exist_ok=True)
+        (pack / name).write_bytes(b"of an earlier pack")
+    clip = [Ingredient("clip", "dance.mp4", "own")]
+    write_pack(pack, {"deploy.yaml": b""}, clip, None)
+    assert (pack / "passport.json").exists(), "the folder held no pack"
+    write_pack(pack, {"deploy.yaml": b"", "policy.onnx": b"new"}, clip, None)
+    assert {path.name for path in pack.iterdir()} == {"deploy.yaml", "policy.onnx", "own_notes.txt"}
 
 
 def test_a_policy_that_sees_what_no_robot_measures_is_refused(folder: Path) -> None:

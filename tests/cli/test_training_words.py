@@ -40,6 +40,15 @@ def test_it_names_every_setting_that_the_checkpoint_insists_on(
     assert result == f"robojackson train r.parquet -o {folder} --minutes 20{words}"
 
 
+def test_a_checkpoint_from_before_a_setting_insists_on_that_of_then(tmp_path: Path) -> None:
+    folder = folder_of(USUAL, tmp_path)
+    file = folder / "checkpoint" / "run.json"
+    kept = json.loads(file.read_text())
+    del kept["configuration"]["tqc"]["n_steps"]
+    file.write_text(json.dumps(kept))
+    assert train_longer(Path("r"), folder, 20).endswith("--minutes 20 --set=tqc.n_steps=1")
+
+
 def test_a_folder_without_a_checkpoint_is_trained_from_the_start(tmp_path: Path) -> None:
     assert train_longer(Path("r"), tmp_path, 20).endswith("--minutes 20")
 

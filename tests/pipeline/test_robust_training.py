@@ -20,7 +20,8 @@ def test_sections_come_first_then_what_is_added_then_the_rest() -> None:
     assert list(with_defaults(added, given).items()) == [
         ("a", {"x": 7}), ("a.b", 1), ("e", 3), ("c.d", 9), ("f", 8)
     ]  # fmt: skip
-    assert with_defaults(added, {"a": {"b": 5}}) == {"a": {"b": 5}, "c.d": 2, "e": 3}
+    for section in ({"b": 5}, "{b: 5}"):
+        assert with_defaults(added, {"a": section}) == {"a": section, "c.d": 2, "e": 3}
 
 
 @pytest.mark.parametrize(("robot", "observation"), [(None, "full"), ("g1", "onboard")])
@@ -34,6 +35,9 @@ def test_a_robust_training_is_that_of_the_motion_s_robot_or_of_the_named_one(
     assert train.seed == 3
     assert (train.track.random.mass, train.track.random.pushes) == (0.2, ROBUST.pushes)
     assert train.track.observation == observation
+    section = {"train.track.random": "{pushes: 0.25}"}
+    varied = requested("base", None, robust(reference, robot, "base", None, section)).train
+    assert (varied.track.random.mass, varied.track.random.pushes) == (ROBUST.mass, 0.25)
     made_elsewhere = replace(ReferenceMotion.load(reference), robot_file="/gone/robot.yaml")
     made_elsewhere.save(tmp_path / "gone.parquet")
     if robot is None:

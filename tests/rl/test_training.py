@@ -28,6 +28,7 @@ from robojackson.rl.evaluation.controllers import drivers
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.evaluation.starts import STAND
 from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import OUTLINE, outline_facts
 from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
 from robojackson.rl.tqc.sbx_trainer import SbxTrainer
 from robojackson.rl.tqc.trainers import make_trainer
@@ -206,6 +207,50 @@ def test_a_polish_on_stock_physics_is_written_by_what_was_chosen_and_no_other_tr
     found = load_policy(run(robot, sway, config, tmp_path).policy).facts.get("chosen")
     chosen = polish and not pushes
     assert found == (["clip", "reference", "robot", "threads"] if chosen else None)
+
+
+@pytest.mark.medium
+def test_a_polish_that_was_stopped_in_its_last_moment_is_chosen_when_it_goes_on(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[int] = []
+
+    def better(policy: Policy, **_: object) -> Policy:
+        tried.append(1)
+        return dataclasses.replace(policy, facts={**policy.facts, "beside_feedback": {}})
+
+    monkeypatch.setattr(training, "better_of", better)
+    config = brief("sbx")
+    config = dataclasses.replace(config, tqc=dataclasses.replace(config.tqc, zero_init=True))
+    longer = dataclasses.replace(config, steps=10 * config.steps)
+    stops = iter([False] * 8 + [True])
+    with pytest.raises(KeyboardInterrupt):
+        train_policy(sway, robot, longer, tmp_path, Hooks(stop=lambda: next(stops)))
+    assert not tried
+    ended = dataclasses.replace(config, steps=1)
+    policy = train_policy(sway, robot, ended, tmp_path).policy
+    assert load_policy(policy).facts["beside_feedback"] == {}
+    train_policy(sway, robot, ended, tmp_path)
+    assert tried == [1], "a training that is over was chosen again"
+
+
+@pytest.mark.medium
+def test_a_training_does_not_go_on_along_another_path(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """As where its folder was copied to a machine that searched another one."""
+    config = brief("sbx")
+    control = dataclasses.replace(config.track.control, feedback=1.0)
+    config = dataclasses.replace(config, track=dataclasses.replace(config.track, control=control))
+    file = run(robot, sway, config, tmp_path).policy
+    kept = load_policy(file)
+    path = np.array(kept.facts[OUTLINE])
+    longer = dataclasses.replace(config, steps=640)
+    dataclasses.replace(kept, facts={**kept.facts, **outline_facts(path + 0.1)}).save(file)
+    with pytest.raises(BadPolicy, match="another path than this machine"):
+        run(robot, sway, longer, tmp_path)
+    dataclasses.replace(kept, facts={**kept.facts, **outline_facts(path + 0.001)}).save(file)
+    assert run(robot, sway, longer, tmp_path).steps == 640
 
 
 @pytest.mark.medium

@@ -10,7 +10,11 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import TrainingFailed
+from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.rl.config.train_config import TrainConfig
+from tasks import train_policy
 from tasks.runtime import child_process
+from tests.fixtures.robots import robot_motion
 
 SLEEPER = "import time; print('started', file=__import__('sys').stderr, flush=True); time.sleep(60)"
 STUBBORN = f"import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); {SLEEPER}"
@@ -122,3 +126,14 @@ def test_a_training_whose_parent_is_gone_does_not_begin() -> None:
 
 def _read(path: Path) -> str:
     return path.read_text() if path.exists() else ""
+
+
+@pytest.mark.parametrize(("name", "searches"), [("g1", True), ("humanoid", False)])
+def test_a_training_on_top_of_feedback_has_time_for_its_search(
+    name: str, searches: bool, tmp_path: Path
+) -> None:
+    motion = robot_motion("hip_shake")
+    reference = motion.save(tmp_path / "reference.parquet")
+    found = train_policy._overtime_s(reference, describe_robot(name), TrainConfig(mode="track"))
+    search_s = train_policy.SEARCH_S_A_SECOND * len(motion) * motion.dt
+    assert found == pytest.approx(train_policy.OVERTIME_S + (search_s if searches else 0.0))

@@ -70,4 +70,5 @@ def robust(
     motion = ReferenceMotion.load(reference)
     description = describe_robot(robot) if robot else description_of(motion)
     train = requested(config, setup, given).train
-    return with_defaults(robust_training(train, description), given)
+    own = given if config is None else {k.removeprefix(SECTION): v for k, v in given.items()}
+    return with_defaults(robust_training(train, description), own)

@@ -21,7 +21,10 @@ def perform(
     ],
     out: Folder,
     robot: Annotated[
-        str | None, typer.Option(help="Name or YAML of the robot; the first tracker's.")
+        str | None,
+        typer.Option(
+            help="Name or YAML of the robot; default: --config's, or the first tracker's."
+        ),
     ] = None,
     tracker: Annotated[
         str | None,
@@ -46,17 +49,22 @@ def perform(
     """Stand, dance one dance after the other, pushed as it goes, and stand: film, page, table."""
     from robojackson.cli import cards
     from robojackson.cli.trackers import performance_files
+    from robojackson.pipeline.pipeline_config import PipelineConfig
     from robojackson.pipeline.tracker_descriptions import usual_robot
+    from robojackson.pipeline.yaml_loader import load
     from robojackson.retarget.performance.programme import ProgrammeConfig
     from robojackson.rl.config.performance_config import PerformanceConfig
 
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     log_to_stderr()
-    given = {"robot": yaml_text(robot or usual_robot()), "tracker": yaml_text(tracker)}
+    overrides = overrides_from(set_, {"robot": yaml_text(robot), "tracker": yaml_text(tracker)})
+    usual = PipelineConfig().robot  # has no tracker
+    if "robot" not in overrides and load(PipelineConfig, config, overrides).robot == usual:
+        overrides["robot"] = yaml_text(usual_robot())
     answer = performance_files.perform(
         dances, out,
         PerformanceConfig(runs=runs, seed=seed, pushes=pushes), ProgrammeConfig(dance_s=seconds),
-        config, overrides_from(set_, given), film,
+        config, overrides, film,
     )  # fmt: skip
     text = cards.shown(answer, performance_files.card(answer), verbose)
     return CommandResult(answer, text=text)

@@ -43,6 +43,11 @@ OF_FEEDBACK = {
 }
 OF_BOTH = OF_FEEDBACK | {"run.py": "polished_runner", "feedback_runner.py": "feedback_runner"}
 """Modules of the kinds of packs by the names of their files."""
+OF_SOME = {
+    *(*OF_BOTH, *OF_NETWORK, "policy.onnx", "policy_obs.onnx", "motion.npz", "feedback.npz"),
+    "passport.json",
+}
+"""Files that a pack may have and another not."""
 
 
 def pack_files(

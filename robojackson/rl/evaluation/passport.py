@@ -34,6 +34,7 @@ FIGURES = ("strict_success", "success", "skill", "survived_s", "site_error_m")
 TIMESTEPS_S = (0.0015, 0.002, 0.004, 0.005)
 INTEGRATORS = ("Euler", "implicitfast", "RK4")
 DELAYS_S = (0.01, 0.02)
+"""About so late, at most one control step."""
 
 
 def robust_ranges() -> dict[str, Any]:
@@ -79,8 +80,9 @@ def _stepping(robot: Robot) -> Iterator[Case]:
 
 
 def _signals(robot: Robot, seed: int) -> Iterator[Case]:
-    for delay in DELAYS_S:
-        late = min(delay, robot.description.control_dt)
+    timestep = float(robot.model.opt.timestep)
+    for delay in DELAYS_S:  # as they are simulated: in whole steps of the physics
+        late = timestep * round(min(delay, robot.description.control_dt) / timestep)
         yield Case(f"action {1e3 * late:g} ms late", conditions=Conditions(delay_s=late))
     noise, pushes = RandomConfig(sensor_noise=1.0), RandomConfig(pushes=1.0)
     yield Case("sensor noise", conditions=Conditions(noise, seed=seed))

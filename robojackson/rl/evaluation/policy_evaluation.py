@@ -46,6 +46,7 @@ from robojackson.rl.policy_facts import (
     is_of_another_motion,
     is_of_another_path,
     mode_of,
+    networks_sha256,
 )
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import control_step, require_same_clock
@@ -96,7 +97,7 @@ def evaluate_policy(
     _warn_about_other_motion(policy, reference)
     reference = facing_ahead(reference) if isinstance(environment, PaperConfig) else reference
     clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
-    _warn_about_other_path(policy, clip)
+    _warn_about_other_path(policy, reference, clip)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
     scorer, meter = (
@@ -130,7 +131,9 @@ def evaluate_policy(
         shown = without_short_figures(own)
         baselines = {name: without_short_figures(found) for name, found in summaries.items()}
     facts: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
-    if not isinstance(policy, Policy):
+    if isinstance(policy, Policy):
+        facts["networks_sha256"] = networks_sha256(policy)
+    else:
         facts["tracker"] = policy.description.name
     if config.passport:
         facts |= passport_facts(passport(policy, reference, robot, config, progress))
@@ -186,9 +189,11 @@ def _warn_about_other_motion(policy: Evaluated, reference: ReferenceMotion) -> N
         )
 
 
-def _warn_about_other_path(policy: Evaluated, clip: Clip) -> None:
-    """Warn about feedback that keeps to another path than the training's."""
-    if isinstance(policy, Policy) and is_of_another_path(policy, clip.outline):
+def _warn_about_other_path(policy: Evaluated, reference: ReferenceMotion, clip: Clip) -> None:
+    """Warn about feedback that keeps to another path than the training's along its own motion."""
+    if not isinstance(policy, Policy) or is_of_another_motion(policy, reference):
+        return
+    if is_of_another_path(policy, clip.outline):
         log.warning("%s; here it will dance worse", OTHER_PATH)
 
 

@@ -25,6 +25,8 @@ from robojackson.robot.model import Robot
 
 log = logging.getLogger(__name__)
 
+BESIDE = "beside_feedback"
+"""Name, in a policy's file, of how well the two dance."""
 RESETS, SEED = 2, 20_261_127
 """Noisy starts a phase, and the seed of their noise, which no evaluation has by default."""
 MARGIN = 0.03
@@ -77,7 +79,7 @@ def better_of(
     trained, alone = tried(TRAINED), tried(REGULATOR)
     beside = {"trained": trained.strict, "feedback": alone.strict}
     skills = {"trained_skill": trained.skill, "feedback_skill": alone.skill}
-    facts = {**policy.facts, "beside_feedback": {**beside, **skills}}
+    facts = {**policy.facts, BESIDE: {**beside, **skills}}
     if not alone.better_than(trained):
         return replace(policy, facts=facts)
     log.warning(

@@ -7,12 +7,15 @@ added robots, because it takes a few seconds of processor time for every second 
 import hashlib
 import io
 import json
+import tokenize
+import zlib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
+import mujoco
 import numpy as np
 
 from robojackson.errors import StoreError
@@ -43,6 +46,11 @@ FOLDER = "feedback"
 ARRAYS = tuple(one.name for one in fields(Gains))
 ROUNDED, SINGLE = ("gain", "offset"), np.float32
 """Arrays that are kept in single precision."""
+DAMAGED = (
+    *(OSError, EOFError, ValueError, KeyError, SyntaxError, NotImplementedError, RuntimeError),
+    *(BadZipFile, zlib.error, tokenize.TokenError),
+)
+"""What reading a damaged file raises: it is computed again."""
 VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
 """Arrays of a model that `variation` changes."""
 NAMED_FACTOR = 4.0
@@ -82,8 +90,7 @@ def _cached(
     """Return the regulator of a motion, from the cache or computed."""
     path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
     if path.is_file():
-        # A damaged file is computed again.
-        with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(path) as arrays:
+        with suppress(*DAMAGED), np.load(path, allow_pickle=False) as arrays:
             found = Gains(*(arrays[name].astype(float) for name in ARRAYS))
             if _fits(found, robot, motion):
                 return found
@@ -149,7 +156,8 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     del motors["action_scale"]  # of the policy: the feedback is bounded by the robot's own
     described = replace(robot.description, robust_action_factor=NAMED_FACTOR)
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
-             motors, settings(), description_sha256(described), robot.contact_names]  # fmt: skip
+             motors, settings(), description_sha256(described), robot.contact_names,
+             mujoco.__version__]  # fmt: skip
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode())

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
-from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig
+from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig, TrainConfig
 from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import AHEAD, Observer
@@ -37,8 +37,10 @@ from robojackson.rl.modes.rewards import (
     tracked_points,
     tracking_errors,
 )
+from robojackson.rl.sim.motors import feedback_share
 from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.robot.description import RobotDescription
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import tree
@@ -160,6 +162,13 @@ def control_of(config: TrackConfig) -> ControlConfig:
     if seen in ("full", "full_preview") or control.feedback == 0:
         return control
     return replace(control, root_state=control.root_state or "estimated")
+
+
+def is_fed(config: TrainConfig, description: RobotDescription) -> bool:
+    """Return whether a training is on top of feedback along its motion."""
+    control = control_of(config.track)
+    pd = config.mode == "track" and control.law == "pd"
+    return pd and feedback_share(description, control) > 0
 
 
 def evaluate_step(

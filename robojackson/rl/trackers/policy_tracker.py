@@ -22,7 +22,8 @@ class PolicyTracker:
     protocol).
 
     Raises:
-        BadPolicy: the file is damaged, or its policy does not see the reference ahead.
+        BadPolicy: the file is damaged, or its policy does not see the reference ahead, or was
+            trained on top of feedback, which a network that follows any motion does not have.
     """
 
     def __init__(self, description: TrackerDescription, path: Path) -> None:
@@ -31,6 +32,11 @@ class PolicyTracker:
             raise BadPolicy(f"{path}: a policy of one motion: it does not see the reference ahead")
         self.window: tuple[int, ...] = (1,)
         self.control = fact(self.policy, "control", ControlConfig)
+        if self.control.feedback:
+            raise BadPolicy(
+                f"{path}: trained on top of feedback, which this tracker does not have: train it "
+                "with --set track.control.feedback=0"
+            )
         self.sees_ahead, self.sees_travel = True, False
 
     def equip(self, robot: Robot) -> Robot:

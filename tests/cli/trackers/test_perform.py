@@ -61,6 +61,13 @@ def test_robot_and_tracker_may_be_given_as_settings(
     assert (result.code, f"UnknownName: unknown {text}" in result.err) == (1, True)
 
 
+def test_the_robot_of_a_configuration_performs(dance: Path, tmp_path: Path) -> None:
+    own = tmp_path / "mine.yaml"
+    own.write_text(f"robot: g1_23\ntracker: {NAME}\n")
+    result = in_process("perform", dance, "-o", tmp_path / "out", "--config", own)
+    assert (result.code, "g1_23" in result.err) == (1, True), result.err
+
+
 @pytest.mark.slow
 def test_an_unknown_robot_is_one_line(dance: Path, tmp_path: Path) -> None:
     words = ("perform", dance, "-o", tmp_path / "out", "--robot", "nobody")

@@ -48,6 +48,8 @@ def test_every_case_differs_from_the_nominal_one(robot: Robot) -> None:
     found = cases(robot, 0)
     assert found[0].name == NOMINAL
     assert len({case.name for case in found}) == len(found)
+    late = [case.name for case in found if case.conditions.delay_s]
+    assert late == ["action 9 ms late", "action 15 ms late"], "of steps of 3 ms, within one of 15"
     plain = found[0]
     for case in found[1:]:
         assert (case.variation, case.conditions) != (plain.variation, plain.conditions), case.name

@@ -99,6 +99,14 @@ def test_a_policy_of_many_motions_is_a_tracker(
     np.testing.assert_allclose(as_tracker.rollout_qpos, as_policy.rollout_qpos, atol=1e-9)
 
 
+def test_a_policy_on_top_of_feedback_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
+    policy = random_policy(stock(), motion, "preview")
+    fed = {**policy.facts, "control": {**policy.facts["control"], "feedback": 1.0}}  # type: ignore[dict-item]
+    path = replace(policy, facts=fed).save(tmp_path / "fed.safetensors")
+    with pytest.raises(BadPolicy, match=r"--set track\.control\.feedback=0"):
+        PolicyTracker(REGULATOR, path)
+
+
 def test_a_policy_of_one_motion_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
     path = random_policy(stock(), motion, "onboard").save(tmp_path / "one.safetensors")
     with pytest.raises(BadPolicy, match="does not see the reference ahead"):
