@@ -52,6 +52,16 @@ INSTANT_MINUTES, SEARCH_MINUTES = 1.0, 3.5
 """About what an instant dance takes until its page, for its bar: with a network, and the search of
 `regulator` besides (24 to 371 CPU-seconds on quiet cores, mean of thirteen motions 201)."""
 INSTANT = "--instant"
+Source = Annotated[
+    str | None,
+    typer.Argument(
+        help="A video or its address, a folder of candidates, or the name of a dance; the bundled "
+        "hip_shake without one."
+    ),
+]
+Instant = Annotated[
+    bool, typer.Option(INSTANT, help="Dance at once by feedback or a tracker; no training.")
+]
 Robust = Annotated[
     bool, typer.Option(help="Train with varied physics, noise and pushes; with a passport.")
 ]
@@ -63,12 +73,7 @@ LONG_ENOUGH_S = 10.0
 
 @command
 def dance(
-    source: Annotated[
-        str | None,
-        typer.Argument(
-            help="A video or its address, a folder of candidates, or the name of a dance."
-        ),
-    ] = None,
+    source: Source = None,
     minutes: Minutes = None,
     robot: Robot = None,
     trainer: Trainer = None,
@@ -79,9 +84,7 @@ def dance(
     end: End = None,
     config: Config = "base",
     force: Force = False,
-    instant: Annotated[
-        bool, typer.Option(INSTANT, help="A general tracker dances at once; no training.")
-    ] = False,
+    instant: Instant = False,
     robust: Robust = False,
     music: Annotated[Path | None, typer.Option(help="A sound file instead of the clip's.")] = None,
     shape: Annotated[
@@ -95,9 +98,12 @@ def dance(
     from flows.search import dance_source
     from flows.search.dance_source import is_on_the_web, load_settings, resolve
     from flows.search.requests import require_findable
+    from robojackson.errors import BadConfiguration
     from robojackson.pipeline.robust_training import robust_dance
     from storage.store import Store
 
+    if instant and minutes is not None:
+        raise BadConfiguration("--instant trains nothing: leave out --minutes, or --instant")
     found = None if is_on_the_web(source) else resolve(source)
     given = {
         "minutes": minutes,

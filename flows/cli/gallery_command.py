@@ -40,7 +40,9 @@ def gallery(
     made = [_entry(store, run) for run in runs if "evaluation" in run.artifacts]
     page = store.put(GALLERY, render_gallery(made).encode())
     answer = {"page": store.address(page.key), "runs": len(made)}
-    return CommandResult(answer, text=[f"{len(made)} dances", f"page   {answer['page']}"])
+    return CommandResult(
+        answer, text=[f"{len(made)} dance{'s' * (len(made) != 1)}", f"page   {answer['page']}"]
+    )
 
 
 def _entry(store: "Store", run: "Run") -> "GalleryRun":

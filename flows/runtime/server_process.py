@@ -8,6 +8,8 @@ from socket import socket
 import uvicorn
 from prefect.server.api.server import create_app
 
+from flows.runtime.sqlite_writers import queued_writers
+
 CONTINUED = (" ", "(")
 """What lines of a traceback begin with that do not name the exception."""
 
@@ -30,7 +32,8 @@ def serve(descriptor: int, pipe: int) -> None:
         return server.started
 
     logging.getLogger("uvicorn.error").addFilter(is_shown)
-    server.run(sockets=[socket(fileno=descriptor)])
+    with queued_writers():
+        server.run(sockets=[socket(fileno=descriptor)])
 
 
 def reason(text: str) -> str:

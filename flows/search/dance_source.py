@@ -77,9 +77,9 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
 
     settings = load(PipelineConfig, config, overrides)
     robot = describe_robot(settings.robot)
-    require_trainable(load_robot(robot))
-    if settings.instant:
+    if settings.instant:  # first: there is no use in adding a robot that has none
         require_tracker(robot.name, settings.tracker)
+    require_trainable(load_robot(robot))
     return settings
 
 

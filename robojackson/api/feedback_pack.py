@@ -76,7 +76,8 @@ def write_feedback_pack(
     evaluated = _evaluation_of(described.name, source, evaluation)
     note = "computed from the robot's model and the motion"
     law = Ingredient("tracker", f"the feedback, {described.name}", "own", note)
-    ingredients = with_declared([law, *motion_ingredients(source, machine)], licences or {})
+    others = motion_ingredients(source, machine, network=False)
+    ingredients = with_declared([law, *others], licences or {})
     parts = deployed_feedback(who.control, motion, machine, progress)
     files = feedback_files(parts, machine, ingredients, evaluated)
     written = write_pack(Path(folder), files, ingredients, evaluated)

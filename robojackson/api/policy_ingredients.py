@@ -39,11 +39,11 @@ def policy_ingredients(
     return [
         Ingredient("weights", "the policy", "own", "trained here", _sha256(path)),
         *_start(str(policy.facts.get("start", UNKNOWN))),
-        *motion_ingredients(reference, robot),
+        *motion_ingredients(reference, robot, network=True),
     ]
 
 
-def motion_ingredients(reference: Path, robot: Robot) -> list[Ingredient]:
+def motion_ingredients(reference: Path, robot: Robot, network: bool) -> list[Ingredient]:
     """List the inputs of a pack beside what drives it: the motion's, the robot and the software."""
     return [
         clip_ingredient(reference),
@@ -51,7 +51,7 @@ def motion_ingredients(reference: Path, robot: Robot) -> list[Ingredient]:
         motion_ingredient(reference, _sha256(reference)),
         robot_ingredient(robot.description, robot.sha256),
         Ingredient("software", "run.py and the texts of the pack", "Apache-2.0", "RoboJackson"),
-        *runner_ingredients(),
+        *runner_ingredients(network),
     ]
 
 

@@ -234,7 +234,8 @@ def train_verdict(updates: int, steps: int, survived_s: Sequence[float]) -> dict
     if not survived_s:
         return {"kind": "learning", "sentence": "No episode ended yet: train longer."}
     mean = sum(survived_s) / len(survived_s)
-    sentence = f"The last {len(survived_s)} episodes of the training lasted {mean:.1f} s."
+    count = len(survived_s)
+    sentence = f"The last {count} episodes of the training lasted {mean:.1f} s on average."
     return {"kind": "trained", "sentence": sentence}
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from robojackson.cli import cards, console
-from robojackson.cli.stages import is_tracker
+from robojackson.cli.trackers.named_tracker import is_tracker
 from robojackson.errors import BadConfiguration
 from robojackson.files.foreign_file import require_file
 from robojackson.formats import registry

@@ -71,7 +71,8 @@ def _verdict(found: list[Figures]) -> Figures:
         sentence = "No person is visible in any video: a whole person has to be in view."
         return {"verdict": {"kind": "nobody", "sentence": sentence}}
     name, score = Path(best["video"]).name, best["score_per_second"]
-    of = "" if len(found) == 1 else f" of {len(found)} videos"
+    scored = sum(bool(entry.get("detected")) for entry in found)
+    of = "" if scored == 1 else f" of {scored} videos"
     sentence = f"{name} is tracked most steadily{of}: {score:.2f} a second."
     return {
         "verdict": {"kind": "steadiest", "sentence": sentence},

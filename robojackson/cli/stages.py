@@ -18,6 +18,7 @@ from robojackson.errors import BadConfiguration, NoPersonFound, RejectedReferenc
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.yaml_loader import load
+from robojackson.rl.config.evaluate_config import REGULATOR
 from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
@@ -181,12 +182,8 @@ def evaluate(
     """Evaluate a policy or a tracker; with a folder, also write its tables and the rollout."""
     from robojackson.api.evaluation import evaluate_policy
     from robojackson.api.trackers import load_tracker
-    from robojackson.cli.training_words import (
-        is_fed_onboard,
-        pack_of,
-        train_after,
-        train_this,
-    )
+    from robojackson.cli.trackers.named_tracker import is_tracker
+    from robojackson.cli.training_words import is_fed_onboard, pack_of, train_after, train_this
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
     settings = load(PipelineConfig, config, overrides)
@@ -212,22 +209,16 @@ def evaluate(
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
 
 
-def is_tracker(policy: Path) -> bool:
-    """Return whether a policy is the name of a tracker; a file of that name takes precedence."""
-    if policy.is_file():
-        return False
-    from robojackson.pipeline.tracker_descriptions import tracker_names
-
-    return str(policy) in tracker_names()
-
-
 VERDICT = ("survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain")
 
 
 def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
-    """Return the table of an evaluation: the policy, then its baselines."""
+    """Return the table of an evaluation: the policy, the feedback that it was trained on top of,
+    then the baselines."""
     name = evaluation.get("tracker", "trained")
-    rows = {name: evaluation, **evaluation.get("trackers", {}), **evaluation["baselines"]}
+    alone = evaluation.get("variants", {}).get(REGULATOR) if name == "trained" else None
+    fed = {"feedback alone": alone} if alone else {}
+    rows = {name: evaluation, **evaluation.get("trackers", {}), **fed, **evaluation["baselines"]}
     if evaluation.get("verdict", {}).get("kind") == "too_short":
         shown = dict.fromkeys(NEEDS_FULL_LENGTH, "too short")
         rows = {name: {**row, **shown} for name, row in rows.items()}

@@ -60,7 +60,10 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     known = trackers_of(robot) if name is None else [describe_tracker(name)]
     if not known:
         every = [f"{each.name} ({each.robot})" for each in map(describe_tracker, tracker_names())]
-        raise BadPolicy(f"there is no tracker for robot {robot!r}; trackers: {', '.join(every)}")
+        raise BadPolicy(
+            f"there is no tracker for robot {robot!r}; trackers: {', '.join(every)}: give their "
+            "robot, as --robot g1"
+        )
     here = [each for each in known if is_present(each)] or known
     chosen = min(here, key=lambda each: each.fallback)
     if chosen.robot != robot:

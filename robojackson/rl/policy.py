@@ -20,6 +20,7 @@ from robojackson.files.file_tree import FileTree
 from robojackson.files.foreign_file import parse_json, require_file
 
 FORMAT = "robojackson-policy-1"
+PARQUET = b"PAR1"
 LARGEST = 1e6
 """Largest magnitude of a weight."""
 
@@ -117,6 +118,9 @@ def load_policy(path: Path) -> Policy:
     """
     require_file(path, BadPolicy)
     try:
+        with path.open("rb") as start:
+            if start.read(len(PARQUET)) == PARQUET:
+                raise BadPolicy(f"{path} is a table: give the policy.safetensors of a training")
         with safe_open(path, framework="np") as file:
             header = file.metadata() or {}
             names = set(file.keys())

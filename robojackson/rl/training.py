@@ -17,12 +17,13 @@ from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.track_config import RandomConfig
-from robojackson.rl.config.train_config import TqcConfig, TrainConfig
+from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.polish_choice import BESIDE, better_of
+from robojackson.rl.feedback.driven_clip import driven_clip
 from robojackson.rl.feedback.sampled_regulator import ENOUGH
-from robojackson.rl.modes.track_mode import control_of
+from robojackson.rl.modes.track_mode import control_of, is_fed
 from robojackson.rl.policy import load_policy
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path, feedback_share
@@ -63,12 +64,15 @@ def train_policy(
     hooks = hooks or Hooks()
     networks = pretrained(config.start, config.mode, robot.description)
     out.mkdir(parents=True, exist_ok=True)
-    of_tqc = (config.tqc.n_envs, config.seed)
-    core = TrackingCore(robot, reference, config.environment, *of_tqc, hooks.rewards)
+    held = held_alone(config, robot, reference)
+    environment, of_tqc = config.environment, (config.tqc.n_envs, config.seed)
+    if config.tqc.preset == "polish" or polishes(config, robot, reference, held):
+        environment = sharper(environment)
+    core = TrackingCore(robot, reference, environment, *of_tqc, hooks.rewards)
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
     if networks is None:
-        tqc = residual_learning(config, robot, reference, core.clip.held_alone)
+        tqc = residual_learning(config, robot, reference, held)
     else:
         tqc = _shaped(networks, core, config)
     seen = core.actor_size if core.actor_size < core.observation_size else None
@@ -137,6 +141,30 @@ def residual_learning(
     if control_of(config.track).root_state == "estimated":
         return replace(polish, action_penalty=ESTIMATED_PENALTY)
     return polish
+
+
+def held_alone(
+    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
+) -> float:
+    """Return the share of the starts from which the feedback of a training alone keeps robots
+    upright, 0..1; NaN where it has none, or that is unknown."""
+    if not is_fed(config, robot.description):
+        return float("nan")
+    return driven_clip(robot, reference, control_of(config.track)).held_alone
+
+
+def sharper(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
+    """Return the environment of a polish, whose narrower bells pay more, and for the last
+    millimetres: where the feedback already dances, the usual ones are nearly all paid
+    (docs/learning_g1.md, "Narrower bells")."""
+    if not isinstance(environment, TrackConfig):
+        return environment
+    reward = environment.reward
+    narrow, fine = (
+        min(reward.narrow, reward.polished_narrow),
+        max(reward.fine, reward.polished_fine),
+    )
+    return replace(environment, reward=replace(reward, narrow=narrow, fine=fine))
 
 
 def polishes(

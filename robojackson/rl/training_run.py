@@ -212,7 +212,7 @@ class Run:
             "actuation": self.core.sim.actuation,
             "repeats": self.core.mode.repeats,
             **outline_facts(self.core.clip.outline),
-            "environment": json.loads(json.dumps(asdict(config.environment))),
+            "environment": json.loads(json.dumps(asdict(self.core.config))),
         }
 
     def _report(self) -> None:

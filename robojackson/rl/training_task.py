@@ -16,8 +16,12 @@ OLDER_TQC = {"n_steps": 1}
 """Numbers of TQC from before they could be chosen."""
 OLDER_RANDOM = {"least": 1.0}
 """Ranges of physics from before they could be graded."""
+OLDER_REWARD = {"polished_fine": 0.5, "polished_narrow": 0.35}
+"""Numbers of the reward from before they could be chosen."""
 SHOWN = 4
 """Differences that a message names at most."""
+LONGEST = 60
+"""Characters of a value in a message."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,27 @@ class Task:
         Raises:
             BadConfiguration: the message names what differs.
         """
+        self._require_same_robot_and_motion(kept, folder)
         apart = list(_differences(self._completed(kept), now))
         if apart:
             raise BadConfiguration(
                 f"{folder} belongs to another configuration, reference motion or robot "
                 f"({'; '.join(apart[:SHOWN])}); remove it or choose another folder"
             )
+
+    def _require_same_robot_and_motion(self, kept: Mapping[str, object], folder: Path) -> None:
+        """Name the robot or the motion that differs, of which there are digests alone."""
+        task = kept.get("task")
+        then = task if isinstance(task, dict) else {}
+        if then.get("robot", self.robot) != self.robot:
+            what = f"robot {then['robot']!r}, and this is of {self.robot!r}"
+        elif then.get("reference_sha256", self.reference_sha256) != self.reference_sha256:
+            what = f"another reference motion of robot {self.robot!r}"
+        else:
+            return
+        raise BadConfiguration(
+            f"{folder} belongs to a training of {what}; remove it or choose another folder"
+        )
 
     def _completed(self, kept: Mapping[str, object]) -> dict[str, object]:
         """Return the configuration of a checkpoint with what older ones did not keep."""
@@ -82,15 +101,18 @@ class Task:
         return {**settings, "task": {**json.loads(json.dumps(asdict(self))), **task}}
 
 
-def completed_settings(kept: Mapping[str, Any]) -> dict[str, object]:
+def completed_settings(kept: Mapping[str, object]) -> dict[str, object]:
     """Return the configuration of a checkpoint with the settings of then that older ones did not
     keep."""
     tqc, track = kept.get("tqc"), kept.get("track")
     if not isinstance(tqc, dict) or not isinstance(track, dict):
         return dict(kept)
-    random = {**OLDER_RANDOM, **track.get("random", {})}
-    control = {"control": _older_control(track)}
-    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**track, **control, "random": random}}
+    sections = {
+        "control": _older_control(track),
+        "random": {**OLDER_RANDOM, **track.get("random", {})},
+        "reward": {**OLDER_REWARD, **track.get("reward", {})},
+    }
+    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**track, **sections}}
 
 
 def _older_control(track: Mapping[str, Any]) -> dict[str, object]:
@@ -114,7 +136,8 @@ def _differences(kept: object, now: object, name: str = "") -> Iterator[str]:
             inner = f"{name}.{key}" if name else str(key)
             yield from _differences(kept.get(key), now.get(key), inner)
     elif kept != now:
-        yield f"{name}: {json.dumps(kept)} there, {json.dumps(now)} here"
+        then, here = (json.dumps(each)[:LONGEST] for each in (kept, now))
+        yield f"{name}: {then} there, {here} here"
 
 
 @dataclass(frozen=True)

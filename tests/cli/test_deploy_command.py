@@ -7,6 +7,7 @@ import pytest
 
 from robojackson.api.deploy_pack import write_deploy_pack
 from robojackson.api.pack_parts import write_pack
+from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.cli.exporting import PackInputs, export, licences_from
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
 from robojackson.formats.deploy.licence_passport import Ingredient
@@ -81,6 +82,13 @@ def test_an_evaluation_of_a_tracker_or_of_other_networks_is_not_in_the_pack(
     (folder / "evaluation.json").write_text(json.dumps(found))
     made = write_deploy_pack(policy, pack, evaluation=folder / "evaluation.json")
     assert made["passport_cases"] == 2
+
+
+def test_a_pack_without_a_network_needs_no_runtime_for_networks(folder: Path) -> None:
+    machine, reference = stock(), folder / "reference.parquet"
+    for network in (True, False):
+        found = motion_ingredients(reference, machine, network=network)
+        assert ("onnxruntime" in {one.name for one in found}) == network
 
 
 def test_a_pack_takes_the_place_of_another(folder: Path) -> None:

@@ -24,6 +24,10 @@ def test_sections_come_first_then_what_is_added_then_the_rest() -> None:
         assert with_defaults(added, {"a": section}) == {"a": section, "c.d": 2, "e": 3}
 
 
+def test_settings_of_a_training_may_be_named_as_in_a_pass() -> None:
+    assert requested(None, None, {"train.seed": 3, "train.tqc.batch": 32}).train.seed == 3
+
+
 @pytest.mark.parametrize(("robot", "observation"), [(None, "full"), ("g1", "onboard")])
 def test_a_robust_training_is_that_of_the_motion_s_robot_or_of_the_named_one(
     tmp_path: Path, robot: str | None, observation: str

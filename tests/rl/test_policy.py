@@ -37,6 +37,12 @@ def test_actions_stay_inside_the_action_space() -> None:
     assert np.abs(small_policy().act(np.full((1, 5), 1e4))).max() <= 1.0
 
 
+def test_a_table_in_place_of_a_policy_is_named(tmp_path: Path) -> None:
+    (tmp_path / "reference.parquet").write_bytes(b"PAR1" + bytes(64))
+    with pytest.raises(BadPolicy, match="is a table: give the policy"):
+        load_policy(tmp_path / "reference.parquet")
+
+
 @pytest.mark.parametrize("content", [b"", b"not a policy", b"PK\x03\x04" + b"\0" * 64])
 def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "policy.safetensors"

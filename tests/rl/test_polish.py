@@ -9,8 +9,8 @@ import pytest
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.tqc_config import PRESETS
-from robojackson.rl.config.train_config import TrainConfig
-from robojackson.rl.training import polishes, residual_learning
+from robojackson.rl.config.train_config import TrackConfig, TrainConfig
+from robojackson.rl.training import polishes, residual_learning, sharper
 from robojackson.robot.model import Robot
 
 
@@ -77,6 +77,15 @@ def test_a_policy_of_own_measurements_is_polished_on_the_estimated_root(
     estimated = residual_learning(onboard, fed, ending, 0.5)
     assert 0 < estimated.action_penalty < by_exact_root.action_penalty
     assert replace(estimated, action_penalty=by_exact_root.action_penalty) == by_exact_root
+
+
+def test_a_narrower_bell_that_is_given_stays() -> None:
+    for given, found in ((0.35, 0.15), (0.05, 0.05)):
+        environment = sharper(configured(**{"track.reward.narrow": given}).environment)
+        assert isinstance(environment, TrackConfig)
+        assert (environment.reward.narrow, environment.reward.fine) == (found, 0.8)
+    paper = configured(mode="paper").environment
+    assert sharper(paper) == paper
 
 
 def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:

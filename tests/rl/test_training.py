@@ -34,6 +34,7 @@ from robojackson.rl.tqc.sbx_trainer import SbxTrainer
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import Hooks, TrainResult, train_policy
 from robojackson.rl.training_run import Run
+from robojackson.rl.training_task import Task
 from robojackson.robot.model import Robot
 
 pytestmark = pytest.mark.xdist_group("trained")
@@ -289,6 +290,32 @@ def test_a_checkpoint_from_before_the_yaml_was_kept_and_ranges_graded_is_continu
 
 
 @pytest.mark.medium
+def test_a_polish_is_paid_by_narrower_bells_and_its_policy_says_so(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    usual = brief("sbx")
+    reward = usual.track.reward
+    wide, sharp = (reward.narrow, reward.fine), (reward.polished_narrow, reward.polished_fine)
+    for preset, bells in (("dance", wide), ("polish", sharp)):
+        tqc = dataclasses.replace(SMALL, preset=preset)
+        config, out = dataclasses.replace(usual, tqc=tqc), tmp_path / preset
+        facts = load_policy(run(robot, sway, config, out).policy).facts
+        environment = facts["environment"]
+        assert isinstance(environment, dict)
+        assert (environment["reward"]["narrow"], environment["reward"]["fine"]) == bells
+    (kept,) = (tmp_path / "polish").glob("checkpoint*/run.json")
+    state = json.loads(kept.read_text())
+    for name in ("polished_narrow", "polished_fine"):
+        del state["configuration"]["track"]["reward"][name]
+    kept.write_text(json.dumps(state))
+    with pytest.raises(BadConfiguration, match=r"polished_narrow: 0\.35 there"):
+        run(robot, sway, config, out)
+    then = dataclasses.replace(reward, polished_narrow=0.35, polished_fine=0.5)
+    track = dataclasses.replace(config.track, reward=then)
+    assert run(robot, sway, dataclasses.replace(config, track=track), out).steps == state["steps"]
+
+
+@pytest.mark.medium
 def test_a_checkpoint_from_before_returns_over_several_steps_is_continued_with_one(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
@@ -380,12 +407,15 @@ def test_a_diverging_training_reports_it_and_keeps_its_policy(
 
 @pytest.mark.medium
 def test_a_checkpoint_of_another_reference_is_refused(
-    trained: tuple, robot: Robot, sway: ReferenceMotion
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
     result, _, _, name = trained
     other = dataclasses.replace(sway, qpos=sway.qpos + 0.01)
-    with pytest.raises(BadConfiguration, match="reference motion"):
+    with pytest.raises(BadConfiguration, match="another reference motion of robot 'humanoid';"):
         run(robot, other, brief(name, 960), result.policy.parent)
+    task = dataclasses.replace(Task.of(sway, robot), robot="g1")
+    with pytest.raises(BadConfiguration, match=r"training of robot 'humanoid', .* of 'g1';"):
+        task.require_same({"task": dataclasses.asdict(Task.of(sway, robot))}, {}, tmp_path)
 
 
 @pytest.mark.medium

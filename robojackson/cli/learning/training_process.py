@@ -89,8 +89,7 @@ def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str
     verdict = cards.train_verdict(trained.updates, trained.steps, survived)
     following = cards.command_line("evaluate", policy, reference)
     if verdict["kind"] == "untrained":
-        log.warning(verdict["sentence"])
-        following = with_option("--minutes", f"{USUAL_MINUTES:g}")
+        following = with_option("--minutes", f"{USUAL_MINUTES:g}", without=("--steps",))
     return {
         "policy": str(policy),
         "reference": str(reference),

@@ -30,6 +30,12 @@ class Requested:
     gate: bool = True
 
 
+def without_section(overrides: Mapping[str, object]) -> dict[str, object]:
+    """Return the overrides of a training that may be named as in a configuration of a pass,
+    `train.seed`, as a setup names them."""
+    return {key.removeprefix(SECTION): value for key, value in overrides.items()}
+
+
 def requested(config: str | None, setup: str | None, overrides: Mapping[str, object]) -> Requested:
     """Return the training that files, `--set` and options request; later ones override earlier
     ones.
@@ -43,7 +49,8 @@ def requested(config: str | None, setup: str | None, overrides: Mapping[str, obj
     from robojackson.rl.config.train_config import TrainConfig
 
     if config is None:
-        return Requested(load(TrainConfig, setup_file(setup), overrides), setup)
+        own = without_section(overrides)
+        return Requested(load(TrainConfig, setup_file(setup), own), setup)
     if setup is not None:
         raise BadConfiguration(
             f"--config {config} and --setup {setup}: give one; a configuration has a "
@@ -70,5 +77,4 @@ def robust(
     motion = ReferenceMotion.load(reference)
     description = describe_robot(robot) if robot else description_of(motion)
     train = requested(config, setup, given).train
-    own = given if config is None else {k.removeprefix(SECTION): v for k, v in given.items()}
-    return with_defaults(robust_training(train, description), own)
+    return with_defaults(robust_training(train, description), without_section(given))

@@ -99,16 +99,18 @@ def same_command() -> str:
     return shlex.join([program(), *sys.argv[1:]])
 
 
-def with_option(option: str, value: str) -> str:
-    """Return the command line of this process with another value of an option."""
+def with_option(option: str, value: str, without: tuple[str, ...] = ()) -> str:
+    """Return the command line of this process with another value of an option.
+
+    Args:
+        without: Options with a value that the line has no longer.
+    """
     words = list(sys.argv[1:])
-    for place, word in enumerate(words):
-        if word == option:
-            del words[place : place + 2]
-            break
-        if word.startswith(f"{option}="):
-            del words[place]
-            break
+    for name in (option, *without):
+        for place, word in enumerate(words):
+            if word == name or word.startswith(f"{name}="):
+                del words[place : place + (2 if word == name else 1)]
+                break
     return shlex.join([program(), *words, option, value])
 
 

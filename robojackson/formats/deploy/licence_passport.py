@@ -117,10 +117,12 @@ def robot_ingredient(description: RobotDescription, sha256: str) -> Ingredient:
     return Ingredient("robot model", name, _of_package(package), f"bundled with {package}", sha256)
 
 
-def runner_ingredients() -> list[Ingredient]:
-    """Return the packages that run.py needs: installed beside a pack, no part of it."""
+def runner_ingredients(network: bool) -> list[Ingredient]:
+    """Return the packages that run.py needs, with a network or without: installed beside a pack, no
+    part of it."""
     note = "run.py imports it; installed beside the pack, no part of it; bundles works of others"
-    return [Ingredient("software", name, licence, note) for name, licence in RUNNER_NEEDS.items()]
+    return [Ingredient("software", name, licence, note) for name, licence in RUNNER_NEEDS.items()
+            if network or name != "onnxruntime"]  # fmt: skip
 
 
 def licence_texts(description: RobotDescription) -> dict[str, bytes]:

@@ -109,6 +109,8 @@ class RewardConfig:
         fine: Share of every term that is paid by a narrower bell: the wide one guides from afar,
             the narrow one still pays for the last centimetre.
         narrow: Width of the narrower bell, in widths of the wide one.
+        polished_fine: The same share in a training that improves what the feedback alone does.
+        polished_narrow: The same width there, in widths of the wide one.
         curiosity: Curiosity bonus of the paper, scaled so that a perfect step earns the same share
             of it.
     """
@@ -138,6 +140,8 @@ class RewardConfig:
     action_rate: float = 0.02
     fine: float = Field(default=0.5, ge=0, le=1)
     narrow: float = Field(default=0.35, gt=0, le=1)
+    polished_fine: float = Field(default=0.8, ge=0, le=1)
+    polished_narrow: float = Field(default=0.15, gt=0, le=1)
     curiosity: Curiosity = "off"
 
     @classmethod

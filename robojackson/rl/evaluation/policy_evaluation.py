@@ -131,13 +131,17 @@ def evaluate_policy(
         shown = without_short_figures(own)
         baselines = {name: without_short_figures(found) for name, found in summaries.items()}
     facts: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
-    if isinstance(policy, Policy):
-        facts["networks_sha256"] = networks_sha256(policy)
-    else:
-        facts["tracker"] = policy.description.name
+    facts |= _who(policy)
     if config.passport:
         facts |= passport_facts(passport(policy, reference, robot, config, progress))
     return Evaluation({**shown, **facts, "verdict": verdict.as_facts()}, rows, qpos)
+
+
+def _who(policy: Evaluated) -> dict[str, str]:
+    """Return the name of a tracker, or the digest of a policy's networks."""
+    if isinstance(policy, Policy):
+        return {"networks_sha256": networks_sha256(policy)}
+    return {"tracker": policy.description.name}
 
 
 def environment_of(policy: Evaluated, control: ControlConfig) -> TrackConfig | PaperConfig:

@@ -67,6 +67,7 @@ def better_of(
     if REGULATOR not in found:
         return policy
     starts, labels = starts_of(robot, clip, config)
+    log.info("trying the policy and the feedback alone from %d starts each", len(labels))
     horizon = clip.horizon(starts.step, config.seconds)
     scorer, fall = RolloutScorer(robot, reference, config), Fall.of(robot)
 

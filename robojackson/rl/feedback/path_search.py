@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.rl.feedback.keypoint_rule import KeypointRule
-from robojackson.rl.feedback.nominal_path import Path, Recursion
+from robojackson.rl.feedback.nominal_path import Path, Progress, Recursion, no_progress
 from robojackson.rl.feedback.regulator import advance, weights
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.sim.simulation import Simulation
@@ -90,7 +90,14 @@ class PathSearch:
         self._places = feet.places(reference.qpos)
         self._breadth = 1
 
-    def run(self, path: Path, law: Recursion, begin: int, breadth: int = 1) -> tuple[Path, bool]:
+    def run(
+        self,
+        path: Path,
+        law: Recursion,
+        begin: int,
+        breadth: int = 1,
+        progress: Progress = no_progress,
+    ) -> tuple[Path, bool]:
         """Return a simulated path from a step of another on, and whether it reaches the end.
 
         Args:
@@ -98,6 +105,7 @@ class PathSearch:
             law: The regulator along it.
             begin: Step from which it is simulated.
             breadth: Factor on the number of robots, and, by its root, on their offsets.
+            progress: Called with a name, the steps that are done, and all.
         """
         self._breadth = breadth
         rows = np.zeros(KEPT, int)
@@ -112,6 +120,7 @@ class PathSearch:
             beam, window = self._window(beam, path, aside, law, t, steps)
             windows.append(window)
             t += steps
+            progress("sampled path", t, len(path))
             beam.shift = self._feet.apart(beam.qpos, self._places[t])
             tilt = state_difference(beam.qpos[:1], beam.qvel[:1], path.qpos[t], path.qvel[t])
             upright = bool(np.linalg.norm(tilt[0, 3:6]) < LOST_RAD)

@@ -112,7 +112,8 @@ def _searched(
     goes along it to the end."""
     begin, furthest, stalls = 0, 0, 0
     for _ in range(PASSES + round(PASSES_A_S * len(path) * dt)):
-        found, ended = search.run(path, riccati(linear, action, False), begin, 1 + stalls)
+        law = riccati(linear, action, False)
+        found, ended = search.run(path, law, begin, 1 + stalls, progress)
         end = begin + len(found) - 1
         stalls = 0 if end > furthest + ADVANCE_S / dt else stalls + 1
         furthest = max(furthest, end)
@@ -121,7 +122,6 @@ def _searched(
         first, last = min(begin, kept), max(begin, kept)
         path = search.joined(path, found, first, kept)
         linear = _with(linear, np.arange(first, min(last + 1, len(path))), sim, path)
-        progress("sampled path", kept, len(path))
         if ended or stalls > STALLS:
             break
         begin = max(0, kept - round(AGAIN_S / dt))

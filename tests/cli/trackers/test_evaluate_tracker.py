@@ -5,7 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.cli.stages import verdict_lines
+from robojackson.cli.trackers.named_tracker import is_tracker
 from robojackson.cli.trackers.tracker_files import add_tracker
+from robojackson.errors import UnknownName
 from robojackson.files import tables
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
 from tests.fixtures.commands import robojackson
@@ -52,3 +55,21 @@ def test_what_is_neither_file_nor_tracker_is_one_line(reference: Path) -> None:
     result = robojackson("evaluate", "twist3", reference)
     assert result.code == 1
     assert "robojackson: BadPolicy: twist3: no such file\n" in result.err
+
+
+def test_a_name_of_no_tracker_and_no_file_lists_the_trackers() -> None:
+    with pytest.raises(UnknownName, match=r"'regulater' \(nor is it a file\)\. Known:.*regulator"):
+        is_tracker(Path("regulater"))
+    assert is_tracker(Path("regulator"))
+    assert not is_tracker(Path("runs/regulator"))
+    assert not is_tracker(Path("policy.safetensors"))
+
+
+def test_the_table_has_the_feedback_that_a_policy_was_trained_on() -> None:
+    figures = dict.fromkeys(("survived_s", "success", "strict_success", "limb_gain"), 1.0)
+    own, alone = ({**figures, "skill": skill, "site_error_m": 0.01} for skill in (0.53, 0.71))
+    variants = {"variants": {"hold": own, "regulator": alone}, "baselines": {"statue": figures}}
+    lines = verdict_lines({**own, **variants})
+    assert [line.split("  ")[0] for line in lines[1:]] == ["trained", "feedback alone", "statue"]
+    assert "0.71" in lines[2]
+    assert "feedback alone" not in str(verdict_lines({**own, **variants, "tracker": "regulator"}))

@@ -224,7 +224,9 @@ class Falls:
     def __init__(self, reach: int) -> None:
         self.reach, self.tried = reach, list[tuple[int, int]]()
 
-    def run(self, path: Path, law: object, begin: int, breadth: int) -> tuple[Path, bool]:
+    def run(
+        self, path: Path, law: object, begin: int, breadth: int, progress: object
+    ) -> tuple[Path, bool]:
         """Return the path up to the fall."""
         self.tried.append((begin, breadth))
         rows = slice(begin, min(self.reach, len(path)))
