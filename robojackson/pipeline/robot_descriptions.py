@@ -61,10 +61,9 @@ def read_description(file: Path) -> RobotDescription:
     if not path.is_file():
         raise UnknownName("robot", str(file), f"no file {path} on {platform.node()}", robot_names())
     if path.suffix.lower() not in SUFFIXES:
-        raise BadConfiguration(
-            f"{file}: a robot is described by a .yaml file; of an MJCF, "
-            f"`robojackson robots new {file}` writes a first one"
-        )
+        first = f"; `robojackson robots new {file}` writes a first one"
+        offered = first if path.suffix.lower() in MODELS else ""
+        raise BadConfiguration(f"{file}: a robot is described by a .yaml file{offered}")
     found = load(RobotDescription, path)
     model = (
         found.mjcf if _in_package(found.mjcf) else os.path.abspath(Path(found.mjcf).expanduser())

@@ -25,13 +25,14 @@ def list_trackers() -> list[Entry]:
 def tracker_lines(found: list[Entry]) -> list[str]:
     """Return the list of trackers as lines."""
     lines: list[str] = []
+    width = max((len(str(entry["tracker"])) for entry in found), default=0)
     for entry in found:
         name = entry["tracker"]
         state = "ready" if entry["ready"] else f"robojackson trackers add {name}"
-        lines.append(f"{name:<10} {entry['robot']:<8} {state}")
+        lines.append(f"{name:<{width}} {entry['robot']:<8} {state}")
         facts = {"licence": entry["licence"], "trained on": entry["trained_on"]}
-        lines += [f"{'':<10} {key:<10} {value}" for key, value in facts.items()]
-        lines.append(f"{'':<10} {entry['homepage']}")
+        lines += [f"{'':<{width}} {key:<10} {value}" for key, value in facts.items()]
+        lines.append(f"{'':<{width}} {entry['homepage']}")
     return lines
 
 

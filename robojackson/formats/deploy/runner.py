@@ -1,6 +1,6 @@
 """Run this deploy pack in MuJoCo: python run.py [--seconds S] [--view]. Ctrl-C damps and stops.
 
-Needs numpy, onnxruntime and mujoco alone. README.md describes the interface of a real robot.
+Needs numpy and mujoco alone, and onnxruntime for a network. README.md has the interface of a robot.
 """
 
 import argparse
