@@ -2,6 +2,7 @@
 
 import asyncio
 from pathlib import Path
+from socket import socket
 
 import pytest
 import sqlalchemy as sa
@@ -9,6 +10,7 @@ from prefect.server.database.configurations import AioSqliteConfiguration
 from prefect.settings import PREFECT_API_DATABASE_CONNECTION_URL, temporary_settings
 from sqlalchemy.exc import OperationalError
 
+from flows.runtime import server_process
 from flows.runtime.sqlite_writers import QueuedSqlite, queued_writers
 
 WRITERS, ROUNDS = 8, 5
@@ -64,3 +66,19 @@ def test_only_sqlite_is_queued(address: str, queued: bool) -> None:
     with temporary_settings({PREFECT_API_DATABASE_CONNECTION_URL: address}), queued_writers():
         config = dependencies.MODELS_DEPENDENCIES["database_config"]
     assert isinstance(config, QueuedSqlite) == queued
+
+
+def test_the_temporary_server_queues_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a `deploy` on the same store its automations write, too."""
+    from prefect.server.database import dependencies
+
+    found: list[object] = []
+
+    def run(server: object, sockets: list[socket]) -> None:
+        found.append(dependencies.MODELS_DEPENDENCIES["database_config"])
+
+    monkeypatch.setattr(server_process.uvicorn.Server, "run", run)
+    address = "sqlite+aiosqlite:////tmp/prefect.db"
+    with socket() as listening, temporary_settings({PREFECT_API_DATABASE_CONNECTION_URL: address}):
+        server_process.serve(listening.detach(), pipe=-1)
+    assert isinstance(found[0], QueuedSqlite)
