@@ -77,7 +77,7 @@ def test_the_temporary_server_queues_them(monkeypatch: pytest.MonkeyPatch) -> No
     def run(server: object, sockets: list[socket]) -> None:
         found.append(dependencies.MODELS_DEPENDENCIES["database_config"])
 
-    monkeypatch.setattr(server_process.uvicorn.Server, "run", run)
+    monkeypatch.setattr("uvicorn.Server.run", run)
     address = "sqlite+aiosqlite:////tmp/prefect.db"
     with socket() as listening, temporary_settings({PREFECT_API_DATABASE_CONNECTION_URL: address}):
         server_process.serve(listening.detach(), pipe=-1)
