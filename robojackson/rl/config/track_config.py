@@ -109,8 +109,9 @@ class RewardConfig:
         fine: Share of every term that is paid by a narrower bell: the wide one guides from afar,
             the narrow one still pays for the last centimetre.
         narrow: Width of the narrower bell, in widths of the wide one.
-        polished_fine: The same share in a training that improves what the feedback alone does.
-        polished_narrow: The same width there, in widths of the wide one.
+        polished_fine: Share that the narrower bell pays in a training that improves what the
+            feedback alone does.
+        polished_narrow: Width of the narrower bell there, in widths of the wide one.
         curiosity: Curiosity bonus of the paper, scaled so that a perfect step earns the same share
             of it.
     """

@@ -54,7 +54,8 @@ def test_twist2_refuses_a_motion_of_the_humanoid_or_says_how_to_get_it(reference
 def test_what_is_neither_file_nor_tracker_is_one_line(reference: Path) -> None:
     result = robojackson("evaluate", "twist3", reference)
     assert result.code == 1
-    assert "robojackson: BadPolicy: twist3: no such file\n" in result.err
+    assert "UnknownName: unknown tracker 'twist3' (nor is it a file). Known: " in result.err
+    assert "Traceback" not in result.err
 
 
 def test_a_name_of_no_tracker_and_no_file_lists_the_trackers() -> None:
