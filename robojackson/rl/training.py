@@ -21,12 +21,12 @@ from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConf
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.polish_choice import BESIDE, better_of
-from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.sampled_regulator import ENOUGH
 from robojackson.rl.modes.track_mode import control_of, is_fed
 from robojackson.rl.policy import load_policy
 from robojackson.rl.pretrained import pretrained
-from robojackson.rl.sim.motors import feedback_path, feedback_share
+from robojackson.rl.sim.motors import feedback_path
 from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained
@@ -150,7 +150,8 @@ def held_alone(
     upright, 0..1; NaN where it has none, or that is unknown."""
     if not is_fed(config, robot.description):
         return float("nan")
-    return driven_clip(robot, reference, control_of(config.track)).held_alone
+    law = feedback_of(robot, motions_of(reference), control_of(config.track))
+    return float("nan") if law is None else law.held
 
 
 def sharper(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
@@ -160,10 +161,8 @@ def sharper(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig
     if not isinstance(environment, TrackConfig):
         return environment
     reward = environment.reward
-    narrow, fine = (
-        min(reward.narrow, reward.polished_narrow),
-        max(reward.fine, reward.polished_fine),
-    )
+    narrow = min(reward.narrow, reward.polished_narrow)
+    fine = max(reward.fine, reward.polished_fine)
     return replace(environment, reward=replace(reward, narrow=narrow, fine=fine))
 
 
@@ -175,13 +174,12 @@ def polishes(
 ) -> bool:
     """Return whether a training begins with what the feedback alone does (`residual_learning`)."""
     track, motions = config.track, motions_of(reference)
-    control = control_of(track)
-    usual = config.mode == "track" and config.trainer == "sbx" and config.start == "scratch"
-    share = feedback_share(robot.description, control)
-    fed = share > 0 and feedback_path(robot, control) == "sampled"
+    usual = config.trainer == "sbx" and config.start == "scratch"
+    path = feedback_path(robot, control_of(track))
+    fed = is_fed(config, robot.description) and path == "sampled"
     better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)
     chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
-    return usual and chosen and control.law == "pd" and fed and better
+    return usual and chosen and fed and better
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:

@@ -95,12 +95,6 @@ class Clip:
         self._last: ClipStep | None = None
 
     @property
-    def held_alone(self) -> float:
-        """Share of the starts from which the feedback alone keeps robots upright, 0..1; NaN where
-        unknown or without one."""
-        return np.nan if self._law is None else self._law.held
-
-    @property
     def outline(self) -> Float[np.ndarray, "M J"] | None:
         """Outline of the path that the feedback keeps robots on (`Law.outline`); None without
         one."""

@@ -45,7 +45,3 @@ class Law(Protocol):
     @property
     def outline(self) -> Float[np.ndarray, "M J"]:
         """Hinge angles of the path that it keeps a robot on, at a few moments, rad."""
-
-    @property
-    def held(self) -> float:
-        """Share of the time that it keeps robots upright by itself, 0..1; NaN where unknown."""
