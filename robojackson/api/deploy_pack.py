@@ -1,6 +1,5 @@
 """Write a deploy pack: a folder that runs a trained policy without RoboJackson."""
 
-import logging
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
@@ -10,17 +9,16 @@ import numpy as np
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
 from robojackson.api.feedback_pack import deployed_feedback
 from robojackson.api.pack_parts import (
-    EVALUATION,
     REFERENCE,
     beside,
-    evaluation_in,
     machine_of,
     motor_of_hinge,
+    own_evaluation,
     write_pack,
 )
 from robojackson.api.policy_ingredients import policy_ingredients
 from robojackson.api.robots import load_robot
-from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.errors import BadPolicy
 from robojackson.formats.deploy.deployed_policy import (
     DeployedPolicy,
     chain_between,
@@ -38,8 +36,6 @@ from robojackson.rl.policy_facts import mode_of, networks_sha256, observation_of
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.motors import residual_scale
 from robojackson.robot.model import Robot
-
-log = logging.getLogger(__name__)
 
 LAST_ACTION_SCALE = 0.5
 """As in the observation of mode `track`."""
@@ -98,26 +94,14 @@ def write_deploy_pack(
 
 
 def _evaluation_of(policy: Policy, path: Path, given: FilePath | None) -> Figures | None:
-    """Return the evaluation of a policy that is given or lies beside it; None where neither is of
-    these networks.
-
-    Raises:
-        StoreError, BadConfiguration: the given file is missing, or of a tracker or other networks.
-    """
-    found = evaluation_in(path.parent, given)
-    if found is None:
-        return None
+    """Return the evaluation of these networks (`own_evaluation`)."""
     own = networks_sha256(policy)
-    if "tracker" not in found and found.get("networks_sha256", own) == own:
-        return found
-    reason = (
-        f"{given or path.parent / EVALUATION} is not an evaluation of {path} as it is now: make "
-        f"one with `robojackson evaluate {path} REFERENCE --passport -o DIR`"
-    )
-    if given is not None:
-        raise BadConfiguration(reason)
-    log.warning("no figures in the pack: %s", reason)
-    return None
+
+    def fits(found: Figures) -> bool:
+        return "tracker" not in found and found.get("networks_sha256", own) == own
+
+    command = f"robojackson evaluate {path} REFERENCE"
+    return own_evaluation(f"{path} as it is now", command, path.parent, given, fits)
 
 
 def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) -> DeployedPolicy:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.api.arguments import FilePath, RobotLike, require_robot, robot_of
-from robojackson.api.pack_parts import evaluation_in, machine_of, motor_of_hinge, write_pack
+from robojackson.api.pack_parts import machine_of, motor_of_hinge, own_evaluation, write_pack
 from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.api.robots import load_robot
 from robojackson.api.trackers import load_tracker
-from robojackson.errors import BadConfiguration, BadPolicy
+from robojackson.errors import BadPolicy
 from robojackson.formats.deploy.deployed_feedback import DeployedFeedback, balls_of, soles_of
 from robojackson.formats.deploy.licence_passport import Ingredient, with_declared
 from robojackson.formats.deploy.pack_files import feedback_files
@@ -73,7 +73,13 @@ def write_feedback_pack(
     motion = ReferenceMotion.load(source)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     machine = who.equip(machine)
-    evaluated = _evaluation_of(described.name, source, evaluation)
+    evaluated = own_evaluation(
+        f"{described.name!r}",
+        f"robojackson evaluate {described.name} {source}",
+        source.parent,
+        evaluation,
+        lambda found: found.get("tracker") == described.name,
+    )
     note = "computed from the robot's model and the motion"
     law = Ingredient("tracker", f"the feedback, {described.name}", "own", note)
     others = motion_ingredients(source, machine, network=False)
@@ -96,24 +102,6 @@ def _require_onboard(tracker: TrackerDescription) -> None:
             "network `regulator` with `root_state: estimated`, such as regulator_onboard, or a "
             "policy that was trained with --set track.observation=onboard"
         )
-
-
-def _evaluation_of(tracker: str, motion: Path, given: FilePath | None) -> Figures | None:
-    """Return the evaluation of a tracker that is given or lies beside the motion; None where
-    neither is of this tracker.
-
-    Raises:
-        StoreError, BadConfiguration: the given file is missing or another tracker's.
-    """
-    found = evaluation_in(motion.parent, given)
-    if found is None or found.get("tracker") == tracker:
-        return found
-    if given is None:
-        return None
-    raise BadConfiguration(
-        f"{given} is not an evaluation of {tracker!r}: make one with `robojackson evaluate "
-        f"{tracker} {motion} --passport -o DIR`"
-    )
 
 
 def deployed_feedback(

@@ -1,6 +1,7 @@
 """What the deploy packs of a policy and of a tracker have in common."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors, gains
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+
+log = logging.getLogger(__name__)
 
 REFERENCE, EVALUATION = "reference.parquet", "evaluation.json"
 SETTINGS = "deploy.yaml"
@@ -77,12 +80,35 @@ def beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path
     return path
 
 
-def evaluation_in(folder: Path, given: FilePath | None) -> Figures | None:
-    """Return the figures of an evaluation; None where none is given and none is in the folder.
+def own_evaluation(
+    of: str, command: str, folder: Path, given: FilePath | None, fits: Callable[[Figures], bool]
+) -> Figures | None:
+    """Return the figures of an evaluation that is given or lies in a folder; None where neither is
+    of what goes into the pack.
+
+    Args:
+        of: What goes into the pack.
+        command: The command that evaluates it.
+        fits: Whether an evaluation is of it.
 
     Raises:
-        StoreError, BadConfiguration: the file is missing or no evaluation.
+        StoreError, BadConfiguration: the given file is missing, no evaluation or of something else.
     """
+    found = _evaluation_in(folder, given)
+    if found is None or fits(found):
+        return found
+    reason = (
+        f"{given or folder / EVALUATION} is not an evaluation of {of}: make one with `{command} "
+        "--passport -o DIR`"
+    )
+    if given is not None:
+        raise BadConfiguration(reason)
+    log.warning("no figures in the pack: %s", reason)
+    return None
+
+
+def _evaluation_in(folder: Path, given: FilePath | None) -> Figures | None:
+    """Return the figures of an evaluation; None where none is given and none is in the folder."""
     path = Path(given) if given else folder / EVALUATION
     path = path / EVALUATION if path.is_dir() else path
     if given is None and not path.is_file():
