@@ -32,7 +32,8 @@ from robojackson.cli.options import (
     Quality,
     Robot,
     SecondVideo,
-    Set,
+    SetMocap,
+    SetRetarget,
     Start,
     Verbose,
     Weights,
@@ -50,7 +51,7 @@ def score(
     video: Annotated[list[Path], typer.Argument(help="Videos, or folders of them.")],
     person: Person = None,
     config: Config = "base",
-    set_: Set = None,
+    set_: SetMocap = None,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
@@ -88,7 +89,7 @@ def mocap(
         bool, typer.Option("--video", help="Also render a video: source, skeleton, body.")
     ] = False,
     config: Config = "base",
-    set_: Set = None,
+    set_: SetMocap = None,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:
@@ -124,7 +125,7 @@ def retarget(
     ] = False,
     config: Config = "base",
     force: Force = False,
-    set_: Set = None,
+    set_: SetRetarget = None,
     verbose: Verbose = False,
     as_json: Json = False,
 ) -> CommandResult:

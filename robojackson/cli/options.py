@@ -50,6 +50,8 @@ def _set(example: str) -> Any:
 
 
 Set = Annotated[list[str] | None, _set("train.seed=3")]
+SetMocap = Annotated[list[str] | None, _set("mocap.leave_out_weak=true")]
+SetRetarget = Annotated[list[str] | None, _set("retarget.tempo=0.8")]
 SetTrain = Annotated[list[str] | None, _set("seed=3")]
 SetFind = Annotated[list[str] | None, _set("filters.person_height_px=100")]
 SetStudy = Annotated[list[str] | None, _set("mode=track")]
