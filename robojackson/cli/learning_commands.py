@@ -50,7 +50,7 @@ def train(
         bool,
         typer.Option(
             help="Vary friction, masses, gains and delays; noise and pushes. A robot with feedback "
-            "observes what it measures itself (track.observation=onboard)."
+            "observes what it measures itself."
         ),
     ] = False,
     run_id: Annotated[str, typer.Option(help="Name of the run in the tables.")] = "",

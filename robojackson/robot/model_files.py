@@ -43,6 +43,8 @@ LARGEST = 1e6
 SHORTEST_STEP_S = 1e-6
 FAILED_INSIDE = "Caught an unknown exception"
 """MuJoCo's words for a failure of the C++ library, such as a ceiling of memory."""
+XML_FAULT = re.compile(r"^XML parse error .*\n.*Line number=(\d+)")
+"""How MuJoCo reports a file that is no XML."""
 
 
 def files_of(path: Path) -> list[Path]:
@@ -144,6 +146,8 @@ def read_model(path: Path) -> mujoco.MjModel:
 def first_line(error: Exception) -> str:
     """Return MuJoCo's reason in one line."""
     lines = str(error).splitlines() or [type(error).__name__]
+    if found := XML_FAULT.search(str(error)):
+        return f"not XML, which MJCF and URDF are, from line {found[1]} on"
     is_full = isinstance(error, MemoryError) or FAILED_INSIDE in lines[0]
     return "not enough memory for this model" if is_full else lines[0]
 

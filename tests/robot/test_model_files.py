@@ -62,3 +62,10 @@ def test_numbers_with_which_nothing_can_be_computed_are_refused(
     with pytest.raises(BadConfiguration, match=r"a\.xml: "):
         read_model(mjcf(tmp_path, inside + BODY))
     assert os.listdir(tmp_path) == ["a.xml"]
+
+
+@pytest.mark.parametrize("content", [b"\x89PNG\r\n\x1a\n", b"<mujoco>\n<worldbody\n</mujoco>"])
+def test_what_is_no_xml_is_named_as_such(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.xml").write_bytes(content)
+    with pytest.raises(BadConfiguration, match=r"a\.xml: not XML, which MJCF and URDF are, from "):
+        read_model(tmp_path / "a.xml")
