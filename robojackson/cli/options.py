@@ -86,7 +86,7 @@ def _out(text: str) -> Any:
 Folder = Annotated[Path, _out("Folder for the results.")]
 TablesFolder = Annotated[Path | None, _out("Folder for the tables.")]
 Weights = Annotated[
-    Path | None, typer.Option(help="Published weights that you bring (docs/official_weights.md).")
+    Path | None, typer.Option(help="Published weights that you bring: docs, official_weights.md.")
 ]
 Start = Annotated[float | None, typer.Option(min=0, help="Trim: begin here, seconds.")]
 End = Annotated[float | None, typer.Option(min=0, help="Trim: end here, seconds.")]
