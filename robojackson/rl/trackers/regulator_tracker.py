@@ -1,4 +1,5 @@
 """The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
+With a network on top of it, a policy that was trained on many motions, it is the dancer.
 
 A motion that the feedback along it does not hold is first simulated many times, for a path beside
 it that the physics follows (`docs/learning_g1.md`, "A sampled path"). It works on any robot whose
@@ -10,9 +11,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.modes.observation import Observer
+from robojackson.rl.policy import Policy, load_policy
+from robojackson.rl.policy_facts import observation_of, policy_control, recorded_law
 from robojackson.rl.sim.leg_odometry import LegOdometry
-from robojackson.rl.sim.motors import Motors
+from robojackson.rl.sim.motors import Motors, residual_scale
 from robojackson.rl.sim.step_law import StepCorrection
 from robojackson.rl.trackers.equipment import require_robot
 from robojackson.rl.trackers.tracker import Follower, TrackerInput
@@ -21,11 +26,29 @@ from robojackson.robot.model import Robot
 
 
 class RegulatorTracker:
-    """Feedback along the reference alone (`Tracker` protocol)."""
+    """Feedback along the reference, alone or with a network on top (`Tracker` protocol).
+
+    Args:
+        description: Its `root_state` says what the feedback is from.
+        path: Policy that was trained on top of feedback from the robot's own measurements, on many
+            motions; None for the feedback alone.
+
+    Attributes:
+        policy: That policy.
+
+    Raises:
+        BadPolicy: the file is none of ours, or a policy without feedback or of the full state.
+    """
 
     def __init__(self, description: TrackerDescription, path: Path | None = None) -> None:
         self.description = description
         self._estimated = description.root_state == "estimated"
+        self.policy = None if path is None else load_policy(path)
+        if self.policy is not None and not (self._estimated and _is_onboard(self.policy)):
+            raise BadPolicy(
+                f"{path}: not a policy of a robot's own measurements on top of feedback: train it "
+                "with --set track.observation=onboard, and set root_state: estimated"
+            )
         self.window: tuple[int, ...] = (1,)
         self.control = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="sampled")
         self.sees_ahead = self.sees_travel = False
@@ -33,13 +56,22 @@ class RegulatorTracker:
     def equip(self, robot: Robot) -> Robot:
         """Return the robot, whose own gains the feedback uses."""
         require_robot(robot, self.description)
+        if self.policy is not None:
+            policy_control(self.policy, robot)
         return robot
 
     def follow(self, robot: Robot, n: int) -> Follower:
         """Return a follower of n robots."""
         require_robot(robot, self.description)
-        kind = _EstimatingFollower if self._estimated else _RegulatorFollower
-        return kind(robot, self.description.control_dt)
+        dt = self.description.control_dt
+        if self.policy is not None:
+            return _LearntFollower(robot, dt, self.policy, n)
+        return (_EstimatingFollower if self._estimated else _RegulatorFollower)(robot, dt)
+
+
+def _is_onboard(policy: Policy) -> bool:
+    """Return whether a policy sees what a robot measures and moves the targets of feedback."""
+    return observation_of(policy) == "onboard" and bool(recorded_law(policy).get("feedback"))
 
 
 class _RegulatorFollower:
@@ -76,3 +108,20 @@ class _EstimatingFollower(_RegulatorFollower):
         """Return the offsets by what is measured and, of the root, estimated, rad."""
         state = self._odometry.estimate(seen.qpos, seen.qvel, seen.force, seen.window[-1])
         return feedback(*state, beside_feet=True)
+
+
+class _LearntFollower(_EstimatingFollower):
+    """N robots with the last action of each."""
+
+    def __init__(self, robot: Robot, dt: float, policy: Policy, n: int) -> None:
+        super().__init__(robot, dt)
+        self._policy, self._observer = policy, Observer(robot, "onboard")
+        self._scale = residual_scale(robot, policy_control(policy, robot))
+        self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
+
+    def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return target hinge angles of the PD law, rad, in actuator order."""
+        targets, step = super().targets(seen), seen.window[-1]
+        observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
+        self._action = self._policy.act(observed[:, : self._observer.actor_size])
+        return targets + self._scale * self._action

@@ -69,6 +69,6 @@ def open_tracker(description: TrackerDescription, file: Path | None = None) -> T
         MissingDependency: the package that runs it is not installed.
     """
     path = require_file(description, file)
-    if path is None:
-        return RegulatorTracker(description)
+    if path is None or description.network == "regulator":
+        return RegulatorTracker(description, path)
     return NETWORKS[description.network](description, path)

@@ -10,10 +10,11 @@ from pydantic import ValidationError
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.tracker_descriptions import describe_tracker, require_tracker
-from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.feedback import path_search, path_trial, sampled_regulator
 from robojackson.rl.modes.observation import AHEAD, Kind
+from robojackson.rl.sim import accelerometer
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.rl.trackers.tracker_description import TrackerDescription
@@ -30,6 +31,8 @@ REGULATOR = TrackerDescription(
     name="regulator", robot="humanoid", network="regulator", licence="ours", trained_on="nothing",
     homepage="here", control_dt=0.015, fallback=True,
 )  # fmt: skip
+
+ONBOARD = replace(REGULATOR, name="dancer", root_state="estimated")
 
 
 @pytest.fixture(autouse=True)
@@ -105,6 +108,37 @@ def test_a_policy_on_top_of_feedback_is_none(motion: ReferenceMotion, tmp_path: 
     path = replace(policy, facts=fed).save(tmp_path / "fed.safetensors")
     with pytest.raises(BadPolicy, match=r"--set track\.control\.feedback=0"):
         PolicyTracker(REGULATOR, path)
+
+
+def test_the_dancer_moves_the_targets_of_the_feedback_as_its_policy_does(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(accelerometer, "NOISE_M_S2", 0.0)
+    law = ControlConfig(feedforward=1.0, feedback=1.0, feedback_path="reference")
+    policy = random_policy(robot, sway, control=replace(law, root_state="estimated"))
+    path = policy.save(tmp_path / "dancer.safetensors")
+    dancer = RegulatorTracker(replace(ONBOARD, control_dt=sway.dt), path)
+    alone = RegulatorTracker(replace(ONBOARD, control_dt=sway.dt))
+    dancer.control = alone.control = law
+    as_tracker, as_policy, without = (
+        evaluate_policy(each, sway, robot, SHORT).rollout_qpos for each in (dancer, policy, alone)
+    )
+    np.testing.assert_allclose(as_tracker, as_policy, atol=1e-9)
+    steps = min(len(as_tracker), len(without))
+    assert np.abs(as_tracker[:steps] - without[:steps]).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("kind", "feedback", "state"),
+    [("full", 1.0, "estimated"), ("onboard", 0.0, "estimated"), ("onboard", 1.0, "exact")],
+)
+def test_a_policy_of_the_full_state_or_without_feedback_is_no_dancer(
+    motion: ReferenceMotion, kind: Kind, feedback: float, state: str, tmp_path: Path
+) -> None:
+    law = ControlConfig(feedback=feedback, feedback_path="reference")
+    path = random_policy(stock(), motion, kind, control=law).save(tmp_path / "one.safetensors")
+    with pytest.raises(BadPolicy, match=r"--set track\.observation=onboard"):
+        RegulatorTracker(replace(ONBOARD, root_state=state), path)  # type: ignore[arg-type]
 
 
 def test_a_policy_of_one_motion_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
