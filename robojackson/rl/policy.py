@@ -5,8 +5,8 @@ header, the facts of the training. Reading it executes nothing and needs neither
 """
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -62,6 +62,11 @@ class Policy:
         weight, bias = self.layers[-1]
         result: np.ndarray = np.tanh(hidden @ weight + bias)
         return result
+
+    def with_first(self, change: Callable[[np.ndarray], np.ndarray]) -> "Policy":
+        """Return the policy with other weights from its observation on."""
+        (weight, bias), *rest = self.layers
+        return replace(self, layers=((change(weight), bias), *rest))
 
     @property
     def _widths(self) -> list[int]:

@@ -175,11 +175,11 @@ class Run:
 
     def _results(self, networks: Tensors, choice: Choice) -> dict[str, bytes]:
         """Return the policy, and the networks that other trainings can start from."""
-        facts = self._facts()
+        facts, of_files = self._facts(), self.core.mode.of_files
         layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
         return {
-            "policy.safetensors": choice(Policy(layers, facts)).to_bytes(),
-            "networks.safetensors": Networks(networks, facts).to_bytes(),
+            "policy.safetensors": choice(Policy(layers, facts).with_first(of_files)).to_bytes(),
+            "networks.safetensors": Networks(networks, facts).with_first(of_files).to_bytes(),
         }
 
     def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:

@@ -16,6 +16,8 @@ OLDER_TQC = {"n_steps": 1}
 """Numbers of TQC from before they could be chosen."""
 OLDER_RANDOM = {"least": 1.0}
 """Ranges of physics from before they could be graded."""
+OLDER_TRACK = {"differences": False}
+"""Numbers of the environment from before they could be chosen."""
 OLDER_REWARD = {"polished_fine": 0.5, "polished_narrow": 0.35}
 """Numbers of the reward from before they could be chosen."""
 SHOWN = 4
@@ -112,7 +114,7 @@ def completed_settings(kept: Mapping[str, object]) -> dict[str, object]:
         "random": {**OLDER_RANDOM, **track.get("random", {})},
         "reward": {**OLDER_REWARD, **track.get("reward", {})},
     }
-    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**track, **sections}}
+    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**OLDER_TRACK, **track, **sections}}
 
 
 def _older_control(track: Mapping[str, Any]) -> dict[str, object]:

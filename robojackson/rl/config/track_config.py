@@ -5,9 +5,10 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from robojackson.config import config_dataclass
+from robojackson.errors import ConflictingValues
 from robojackson.rl.config.paper_config import Curiosity
 from robojackson.robot.description import FeedbackPath
 
@@ -220,11 +221,14 @@ class TrackConfig:
         observation: Inputs of the policy: `full`, everything that a simulation knows; `onboard`,
             the measurements of a real robot (the critics see everything); `preview`, these and
             the reference ahead; or `full_preview`, everything and the reference ahead.
+        differences: Whether a policy of `onboard` sees hinge angles and speeds as differences from
+            the reference alone, so that what it learns holds for other motions, too.
         episode_seconds: Time limit of a training episode, s; its end is bootstrapped.
         threads: Threads that step the simulations.
     """
 
     observation: Literal["full", "onboard", "preview", "full_preview"] = "full"
+    differences: bool = False
     control: ControlConfig = Field(default_factory=ControlConfig)
     reset: ResetConfig = Field(default_factory=ResetConfig)
     reward: RewardConfig = Field(default_factory=RewardConfig)
@@ -232,3 +236,13 @@ class TrackConfig:
     random: RandomConfig = Field(default_factory=RandomConfig)
     episode_seconds: float = Field(default=6.0, gt=0)
     threads: int = Field(default=2, ge=1)
+
+    @model_validator(mode="after")
+    def _seen_differences(self) -> "TrackConfig":
+        if self.differences and self.observation != "onboard":
+            raise ConflictingValues(
+                "differences is for observation onboard; the others have more of the reference",
+                "differences",
+                "observation",
+            )
+        return self

@@ -126,6 +126,17 @@ class TrainConfig:
             )
         return self
 
+    @model_validator(mode="after")
+    def _same_inputs(self) -> "TrainConfig":
+        if self.track.differences and self.mode == "track" and self.start != "scratch":
+            raise ConflictingValues(
+                "track.differences needs start scratch: files hold networks of the observation "
+                "itself",
+                "track.differences",
+                "start",
+            )
+        return self
+
     @property
     def has_budget(self) -> bool:
         """Return whether the training has a budget."""

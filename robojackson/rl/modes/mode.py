@@ -65,6 +65,9 @@ class Mode(Protocol):
     def observe(self, following: ClipStep, action: np.ndarray) -> Float[np.ndarray, "N D"]:
         """Return the observations, with the next step of the reference and the last action."""
 
+    def of_files(self, weight: Float[np.ndarray, "D units"]) -> Float[np.ndarray, "E units"]:
+        """Return the first weights of a network for the observation that its file is for."""
+
     def after(self, command: np.ndarray) -> None:
         """Count a control step of the simulation; called after each."""
 

@@ -17,6 +17,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.paper_config import BETA
 from robojackson.rl.config.train_config import ControlConfig, RewardConfig, TrackConfig, TrainConfig
 from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.modes.differences import Differences
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.observation import AHEAD, Observer
 from robojackson.rl.modes.reset_states import (
@@ -79,6 +80,11 @@ class TrackMode:
         self._observer = Observer(robot, config.observation)
         self.observation_size = self._observer.size
         self.actor_size = self._observer.actor_size
+        self._differences = None
+        if config.differences:
+            self._differences = Differences(robot.model.nq - 7, robot.model.nu)
+            self.observation_size += self._differences.size - self.actor_size
+            self.actor_size = self._differences.size
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:
         """Return the motors' targets of the actions."""
@@ -89,7 +95,12 @@ class TrackMode:
         """Return the observations."""
         sim = self.sim
         exact = (sim.qpos, sim.qvel)
-        return self._observer.observe(*sim.sensed(), sim.points, following, action, exact)
+        seen = self._observer.observe(*sim.sensed(), sim.points, following, action, exact)
+        return seen if self._differences is None else self._differences.of(seen)
+
+    def of_files(self, weight: Float[np.ndarray, "D units"]) -> Float[np.ndarray, "E units"]:
+        """Return the first weights of a network for an observation without differences."""
+        return weight if self._differences is None else self._differences.taken_up(weight)
 
     def after(self, command: np.ndarray) -> None:
         """Do nothing: no quantity is counted within a step."""

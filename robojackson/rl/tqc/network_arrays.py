@@ -8,7 +8,7 @@ safetensors.
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count, pairwise, takewhile
 from pathlib import Path
@@ -59,6 +59,12 @@ class Networks:
         """Return the units of every layer of a part."""
         names = (f"{part}.{i}.weight" for i in count())
         return tuple(self.tensors[n].shape[1] for n in takewhile(self.tensors.__contains__, names))
+
+    def with_first(self, change: Callable[[np.ndarray], np.ndarray]) -> "Networks":
+        """Return the networks with other weights from their observation on."""
+        first = {f"{part}.0.weight" for part in ("actor", *CRITICS, *TARGETS)}
+        tensors = {name: change(t) if name in first else t for name, t in self.tensors.items()}
+        return replace(self, tensors=tensors)
 
     @property
     def layer_norm(self) -> bool:

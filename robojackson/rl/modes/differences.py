@@ -1,0 +1,56 @@
+"""What a policy sees of an `onboard` observation that is to hold for motions that it never saw.
+
+Hinge angles and speeds are differences from the next step of the reference, and the reference's own
+are left out: by those a policy knows the moment of its motion and learns it by heart. The map is
+linear, so that the first layer of a network takes it up: files hold networks of the whole
+observation.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+ROOT_INPUTS = 9
+"""Gyroscope and attitude, at the beginning of the observation."""
+ANGLE_SCALE = 3.0
+"""Factor of a difference of angles, for about one."""
+SPEED_SCALE = 1.0
+"""Factor of a difference of speeds, which are scaled already."""
+
+
+class Differences:
+    """The map of an observation, and of the first weights of a network.
+
+    Args:
+        hinges, motors: Numbers of them.
+
+    Attributes:
+        size: Length of the policy's part of the mapped observation.
+    """
+
+    def __init__(self, hinges: int, motors: int) -> None:
+        eye, root = np.eye(hinges), np.eye(ROOT_INPUTS)
+        whole = ROOT_INPUTS + 4 * hinges + motors
+        self.size = ROOT_INPUTS + 2 * hinges + motors
+        self._map: Float[np.ndarray, "D E"] = np.zeros((whole, self.size))
+        angles, speeds, aims, aimed, done = (
+            ROOT_INPUTS + part * hinges + np.arange(motors if part == 4 else hinges)
+            for part in range(5)
+        )
+        self._map[:ROOT_INPUTS, :ROOT_INPUTS] = root
+        self._map[aims[:, None], angles] = ANGLE_SCALE * eye
+        self._map[angles[:, None], angles] = -ANGLE_SCALE * eye
+        self._map[aimed[:, None], speeds] = SPEED_SCALE * eye
+        self._map[speeds[:, None], speeds] = -SPEED_SCALE * eye
+        self._map[done[:, None], self.size - motors + np.arange(motors)] = np.eye(motors)
+
+    def of(self, observation: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N E"]:
+        """Return observations as the networks see them; what follows the policy's part stays."""
+        whole = len(self._map)
+        mapped = observation[:, :whole] @ self._map
+        return np.concatenate([mapped, observation[:, whole:]], 1).astype(np.float32)
+
+    def taken_up(self, weight: Float[np.ndarray, "E units"]) -> Float[np.ndarray, "D units"]:
+        """Return the first weights of a network for the whole observation."""
+        weight = np.asarray(weight, float)
+        first = self._map @ weight[: self.size]
+        return np.concatenate([first, weight[self.size :]]).astype(np.float32)
