@@ -159,8 +159,7 @@ def doctor(
     if report:
         from robojackson.cli.diagnosis.issue_report import issue_report
 
-        block = issue_report(found)
-        return CommandResult({"report": "\n".join(block)}, text=block)
+        return CommandResult({"report": "\n".join(block := issue_report(found))}, text=block)
     return CommandResult(found, code=0 if found["ok"] else 1, text=doctor_lines(found))
 
 
