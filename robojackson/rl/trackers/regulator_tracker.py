@@ -124,4 +124,5 @@ class _LearntFollower(_EstimatingFollower):
         targets, step = super().targets(seen), seen.window[-1]
         observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
         self._action = self._policy.act(observed[:, : self._observer.actor_size])
-        return targets + self._scale * self._action
+        moved: np.ndarray = targets + self._scale * self._action
+        return moved
