@@ -4,9 +4,9 @@
 
 REFERENCES holds reference motions (`tools.dancer.library`); a captured one that the split file does
 not list for training is refused. Motions that the feedback alone does not hold are passed over.
-The policy sees a robot's own measurements and the next step of the reference; what comes after that
-step is in the gains of the feedback (residual policy learning: Silver et al., 2018). The same
-command goes on where a run was stopped. OUT gets `dancer.safetensors`, which
+The policy sees a robot's own measurements as differences from the next step of the reference; what
+comes after that step is in the gains of the feedback (residual policy learning: Silver et al.,
+2018). The same command goes on where a run was stopped. OUT gets `dancer.safetensors`, which
 `configs/trackers/dancer.yaml` names, `networks.safetensors`, which a training may start from, and
 `curve.csv`.
 """
@@ -28,7 +28,7 @@ from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import load_policy
 from robojackson.rl.tqc.network_arrays import load_networks
-from robojackson.rl.training import ESTIMATED_PENALTY, train_policy
+from robojackson.rl.training import train_policy
 from robojackson.rl.training_hooks import Hooks, Row
 from robojackson.robot.model import Robot
 from tools.dancer.pack import collection
@@ -44,8 +44,9 @@ OF_ONE_MOTION = ("reference_sha256", "feedback_outline")
 
 def configuration(steps: int, seed: int) -> TrainConfig:
     """Return the training: a polish on feedback from the estimated root."""
-    track = TrackConfig(observation="onboard", control=ControlConfig(feedback_path="sampled"))
-    tqc = TqcConfig(preset="polish", action_penalty=ESTIMATED_PENALTY)
+    law = ControlConfig(feedback_path="sampled")
+    track = TrackConfig(observation="onboard", differences=True, control=law)
+    tqc = TqcConfig(preset="polish")
     return TrainConfig(steps=steps, seed=seed, track=track, tqc=tqc)
 
 
