@@ -96,11 +96,12 @@ def _require_onboard(tracker: TrackerDescription) -> None:
     Raises:
         BadPolicy: a network, or feedback of the exact state.
     """
-    if tracker.network != "regulator" or tracker.root_state != "estimated":
+    alone = tracker.network == "regulator" and tracker.file is None
+    if not alone or tracker.root_state != "estimated":
         raise BadPolicy(
             f"tracker {tracker.name!r} cannot go into a deploy pack: that takes a tracker of the "
-            "network `regulator` with `root_state: estimated`, such as regulator_onboard, or a "
-            "policy that was trained with --set track.observation=onboard"
+            "network `regulator` with `root_state: estimated` and no file, such as "
+            "regulator_onboard, or a policy that was trained with --set track.observation=onboard"
         )
 
 

@@ -1,7 +1,6 @@
 """Commands that run one stage, as one application; `flows.cli.commands` adds the others.
 
-Every command imports its dependencies in its body, so that one stage runs without Prefect and
-`--help` is fast.
+Commands import what they need in their bodies: a stage runs without Prefect, `--help` is fast.
 """
 
 import os
@@ -159,7 +158,8 @@ def doctor(
     if report:
         from robojackson.cli.diagnosis.issue_report import issue_report
 
-        return CommandResult({"report": "\n".join(block := issue_report(found))}, text=block)
+        block = issue_report(found)
+        return CommandResult({"report": "\n".join(block)}, text=block)
     return CommandResult(found, code=0 if found["ok"] else 1, text=doctor_lines(found))
 
 

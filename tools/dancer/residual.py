@@ -13,7 +13,6 @@ comes after that step is in the gains of the feedback (residual policy learning:
 
 import argparse
 import csv
-import hashlib
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from robojackson import load_robot
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.feedback.cached_feedback import feedback_of
@@ -111,8 +111,8 @@ def main() -> None:
     train_policy(
         list(chosen.values()), robot, configuration(given.steps, given.seed), given.out, hooks
     )
-    content = shipped(given.out, list(chosen)).read_bytes()
-    print(f"size {len(content)}, sha256 {hashlib.sha256(content).hexdigest()}")
+    path = shipped(given.out, list(chosen))
+    print(f"size {path.stat().st_size}, sha256 {sha256_of_file(path)}")
 
 
 if __name__ == "__main__":

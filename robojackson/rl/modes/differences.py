@@ -8,13 +8,12 @@ observation.
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import block_diag
 
 ROOT_INPUTS = 9
 """Gyroscope and attitude, at the beginning of the observation."""
-ANGLE_SCALE = 3.0
-"""Factor of a difference of angles, for about one."""
-SPEED_SCALE = 1.0
-"""Factor of a difference of speeds, which are scaled already."""
+OF_A_HINGE = np.array([[-3.0, 0.0], [0.0, -1.0], [3.0, 0.0], [0.0, 1.0]])
+"""Angle, speed and those of the reference of a hinge -> both differences, scaled to about one."""
 
 
 class Differences:
@@ -28,20 +27,9 @@ class Differences:
     """
 
     def __init__(self, hinges: int, motors: int) -> None:
-        eye, root = np.eye(hinges), np.eye(ROOT_INPUTS)
-        whole = ROOT_INPUTS + 4 * hinges + motors
         self.size = ROOT_INPUTS + 2 * hinges + motors
-        self._map: Float[np.ndarray, "D E"] = np.zeros((whole, self.size))
-        angles, speeds, aims, aimed, done = (
-            ROOT_INPUTS + part * hinges + np.arange(motors if part == 4 else hinges)
-            for part in range(5)
-        )
-        self._map[:ROOT_INPUTS, :ROOT_INPUTS] = root
-        self._map[aims[:, None], angles] = ANGLE_SCALE * eye
-        self._map[angles[:, None], angles] = -ANGLE_SCALE * eye
-        self._map[aimed[:, None], speeds] = SPEED_SCALE * eye
-        self._map[speeds[:, None], speeds] = -SPEED_SCALE * eye
-        self._map[done[:, None], self.size - motors + np.arange(motors)] = np.eye(motors)
+        of_hinges = np.kron(OF_A_HINGE, np.eye(hinges))
+        self._map = block_diag(np.eye(ROOT_INPUTS), of_hinges, np.eye(motors))
 
     def of(self, observation: Float[np.ndarray, "N D"]) -> Float[np.ndarray, "N E"]:
         """Return observations as the networks see them; what follows the policy's part stays."""

@@ -48,22 +48,32 @@ class PolicyTracker:
     def follow(self, robot: Robot, n: int) -> Follower:
         """Return a follower of n robots."""
         require_robot(robot, self.description)
-        return _PolicyFollower(self.policy, self.control, robot, n)
+        return _PolicyFollower(self.policy, robot, n)
+
+
+class Actor:
+    """A policy on top of the targets of N robots, with the last action of each."""
+
+    def __init__(self, policy: Policy, robot: Robot, n: int) -> None:
+        self._policy, self._observer = policy, Observer(robot, observation_of(policy))
+        self._scale = residual_scale(robot, policy_control(policy, robot))
+        self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
+
+    def offsets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
+        """Return offsets of the targets of the PD law, rad, in actuator order."""
+        step = seen.window[-1]
+        observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
+        self._action = self._policy.act(observed[:, : self._observer.actor_size])
+        offsets: np.ndarray = self._scale * self._action
+        return offsets
 
 
 class _PolicyFollower:
-    """N robots with the last action of each."""
+    """N robots and what the policy did with each last."""
 
-    def __init__(self, policy: Policy, control: ControlConfig, robot: Robot, n: int) -> None:
-        self._policy, self._observer = policy, Observer(robot, observation_of(policy))
-        self._hinge = Motors.of(robot.model).hinge
-        self._scale = residual_scale(robot, control)
-        self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
+    def __init__(self, policy: Policy, robot: Robot, n: int) -> None:
+        self._actor, self._hinge = Actor(policy, robot, n), Motors.of(robot.model).hinge
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
-        (step,) = seen.window
-        observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
-        self._action = self._policy.act(observed[:, : self._observer.actor_size])
-        targets: np.ndarray = step.angles(self._hinge) + self._scale * self._action
-        return targets
+        return seen.window[-1].angles(self._hinge) + self._actor.offsets(seen)

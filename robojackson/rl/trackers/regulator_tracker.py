@@ -13,13 +13,13 @@ from jaxtyping import Float
 
 from robojackson.errors import BadPolicy
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import observation_of, policy_control, recorded_law
 from robojackson.rl.sim.leg_odometry import LegOdometry
-from robojackson.rl.sim.motors import Motors, residual_scale
+from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.step_law import StepCorrection
 from robojackson.rl.trackers.equipment import require_robot
+from robojackson.rl.trackers.policy_tracker import Actor
 from robojackson.rl.trackers.tracker import Follower, TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.robot.model import Robot
@@ -111,18 +111,12 @@ class _EstimatingFollower(_RegulatorFollower):
 
 
 class _LearntFollower(_EstimatingFollower):
-    """N robots with the last action of each."""
+    """N robots with a policy on top of the feedback."""
 
     def __init__(self, robot: Robot, dt: float, policy: Policy, n: int) -> None:
         super().__init__(robot, dt)
-        self._policy, self._observer = policy, Observer(robot, "onboard")
-        self._scale = residual_scale(robot, policy_control(policy, robot))
-        self._action: Float[np.ndarray, "N nu"] = np.zeros((n, robot.model.nu))
+        self._actor = Actor(policy, robot, n)
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
-        targets, step = super().targets(seen), seen.window[-1]
-        observed = self._observer.observe(seen.qpos, seen.qvel, seen.points, step, self._action)
-        self._action = self._policy.act(observed[:, : self._observer.actor_size])
-        moved: np.ndarray = targets + self._scale * self._action
-        return moved
+        return super().targets(seen) + self._actor.offsets(seen)

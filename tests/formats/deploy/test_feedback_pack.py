@@ -28,7 +28,7 @@ from robojackson.rl.sim.accelerometer import Accelerometer
 from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
-from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
 from robojackson.robot.model import Robot, load_robot
 from tests.fixtures.deploy_policies import bare_packages, lose, run_bare, swaying
 from tests.fixtures.robots import stock
@@ -333,3 +333,12 @@ def test_a_rotation_matrix_is_mujocos() -> None:
     half = 0.3
     found = matrix(np.array([np.cos(half), 0, 0, np.sin(half)]))
     np.testing.assert_allclose(found[:2, 0], [np.cos(2 * half), np.sin(2 * half)])
+
+
+def test_a_tracker_with_a_network_is_not_written_without_it(made: Made, tmp_path: Path) -> None:
+    tracker = tracker_of()
+    file = TrackerFile(name="dancer.safetensors", size=1, sha256="0" * 64)
+    tracker.description = replace(tracker.description, file=file)
+    with pytest.raises(BadPolicy, match="cannot go into a deploy pack"):
+        write_feedback_pack(tracker, made.folder.parent / "reference.parquet", tmp_path / "pack")
+    assert not (tmp_path / "pack").exists()
