@@ -76,4 +76,5 @@ class _PolicyFollower:
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
-        return seen.window[-1].angles(self._hinge) + self._actor.offsets(seen)
+        targets: np.ndarray = seen.window[-1].angles(self._hinge) + self._actor.offsets(seen)
+        return targets

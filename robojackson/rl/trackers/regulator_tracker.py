@@ -119,4 +119,5 @@ class _LearntFollower(_EstimatingFollower):
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""
-        return super().targets(seen) + self._actor.offsets(seen)
+        targets: np.ndarray = super().targets(seen) + self._actor.offsets(seen)
+        return targets
