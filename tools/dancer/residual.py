@@ -3,7 +3,8 @@
     python -m tools.dancer.residual REFERENCES -o OUT --steps 1500000 [--seed 0] [--without NAME...]
 
 REFERENCES holds reference motions (`tools.dancer.library`); a captured one that the split file does
-not list for training is refused. Motions that the feedback alone does not hold are passed over.
+not list for training is refused. Motions that the feedback alone does not hold are passed over; of
+the others it learns the mirror images, too.
 The policy sees a robot's own measurements as differences from the next step of the reference; what
 comes after that step is in the gains of the feedback (residual policy learning: Silver et al.,
 2018). The same command goes on where a run was stopped. OUT gets `dancer.safetensors`, which
@@ -24,19 +25,22 @@ from robojackson import load_robot
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, TqcConfig, TrackConfig, TrainConfig
-from robojackson.rl.feedback.cached_feedback import feedback_of
+from robojackson.rl.feedback.cached_feedback import feedback_of, keep_feedback
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import load_policy
 from robojackson.rl.tqc.network_arrays import load_networks
 from robojackson.rl.training import train_policy
 from robojackson.rl.training_hooks import Hooks, Row
 from robojackson.robot.model import Robot
+from tools.dancer.mirror import Images
 from tools.dancer.pack import collection
 
 log = logging.getLogger(__name__)
 
 LEAST_HELD = 0.3
 """Share of its starts from which the feedback, of the exact root, has to hold a motion."""
+MIRRORED = "_mirrored"
+"""How the name of a mirror image ends."""
 COLUMNS = ("steps", "survived_s", "site_error_m", "episode_return")
 OF_ONE_MOTION = ("reference_sha256", "feedback_outline")
 """Facts of a training that name its motion."""
@@ -51,15 +55,18 @@ def configuration(steps: int, seed: int) -> TrainConfig:
 
 
 def held(robot: Robot, named: Mapping[str, ReferenceMotion]) -> dict[str, ReferenceMotion]:
-    """Return the motions that the feedback along them holds; it is computed where it is not in the
-    store."""
-    law, kept = control_of(configuration(1, 0).track), {}
+    """Return the motions that the feedback along them holds, and their mirror images; the feedback
+    is computed where it is not in the store."""
+    law, kept = control_of(configuration(1, 0).track), dict[str, ReferenceMotion]()
+    images = Images(robot)
     for name, motion in named.items():
         found = feedback_of(robot, [motion], law)
         share = np.nan if found is None else found.held
         log.info("%s: the feedback holds %.0f %% of its starts", name, 100 * share)
-        if share >= LEAST_HELD:
-            kept[name] = motion
+        if found is not None and share >= LEAST_HELD:
+            image = images.motion(motion)
+            keep_feedback(robot, image, law, images.gains(found.gains))
+            kept |= {name: motion, f"{name}{MIRRORED}": image}
     return kept
 
 

@@ -5,7 +5,6 @@ python -m tools.dancer.ship OUT/dancer.npz -o robojackson/assets/dancer_g1.safet
 """
 
 import argparse
-import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import torch
 
 from robojackson import load_robot
+from robojackson.files.local_folder import sha256_of_file
 from robojackson.rl.config.train_config import TrackConfig
 from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy
@@ -61,8 +61,7 @@ def main() -> None:
         given.training, load_robot(given.robot), KINDS[given.sees], given.seed, given.motions
     )
     path = policy.save(given.out)
-    content = path.read_bytes()
-    print(f"{path}: {policy!r}, size {len(content)}, sha256 {hashlib.sha256(content).hexdigest()}")
+    print(f"{path}: {policy!r}, size {path.stat().st_size}, sha256 {sha256_of_file(path)}")
 
 
 if __name__ == "__main__":

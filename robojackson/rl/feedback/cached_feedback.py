@@ -84,11 +84,22 @@ def feedback_of(
     return Feedback(scaled, most * action, Feet(robot))
 
 
+def keep_feedback(
+    robot: Robot, motion: ReferenceMotion, control: ControlConfig, gains: Gains
+) -> None:
+    """Keep the gains of a motion that were computed elsewhere, for `feedback_of`."""
+    _keep(_path(robot, motion, control), _single(gains))
+
+
+def _path(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> Path:
+    return robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
+
+
 def _cached(
     robot: Robot, motion: ReferenceMotion, control: ControlConfig, progress: Progress
 ) -> Gains:
     """Return the regulator of a motion, from the cache or computed."""
-    path = robots_folder().parent / FOLDER / f"{_digest(robot, motion, control)}.npz"
+    path = _path(robot, motion, control)
     if path.is_file():
         with suppress(*DAMAGED), np.load(path, allow_pickle=False) as arrays:
             found = Gains(*(arrays[name].astype(float) for name in ARRAYS))

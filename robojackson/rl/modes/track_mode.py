@@ -82,8 +82,9 @@ class TrackMode:
         self.actor_size = self._observer.actor_size
         self._differences = None
         if config.differences:
-            self._differences = Differences(robot.model.nq - 7, robot.model.nu)
-            self.observation_size += self._differences.size - self.actor_size
+            rest = self.observation_size - self.actor_size
+            self._differences = Differences(robot.model.nq - 7, robot.model.nu, rest)
+            self.observation_size = self._differences.whole
             self.actor_size = self._differences.size
 
     def command(self, following: ClipStep, action: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
-from robojackson.rl.modes.differences import Differences
+from robojackson.rl.modes.differences import ROOT_INPUTS, Differences
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.sim.reference_clip import Clip
@@ -36,7 +36,9 @@ def test_another_pose_with_the_same_errors_looks_the_same(
         angles[:, 7:] += 0.2
         speeds[:, 6:] -= 0.5
     seen.append(observer.observe(*moved, replace(target, qpos=qpos, qvel=qvel), still))
-    differences = Differences(robot.model.nq - 7, robot.model.nu)
+    differences = Differences(
+        robot.model.nq - 7, robot.model.nu, observer.size - observer.actor_size
+    )
     first, second = (differences.of(each)[:, : differences.size] for each in seen)
     assert np.abs(seen[0] - seen[1])[:, : observer.actor_size].max() > 0.04
     np.testing.assert_allclose(first, second, atol=1e-6)
@@ -58,12 +60,31 @@ def test_a_files_network_does_on_the_whole_observation_what_was_learnt_on_the_di
     assert kept.observation_size == whole.actor_size
     seen, all_of_it = core.reset(), whole.reset()
     assert seen.shape[1] == core.observation_size
-    np.testing.assert_array_equal(seen[:, core.actor_size :], all_of_it[:, whole.actor_size :])
+    end = core.actor_size + whole.observation_size - whole.actor_size
+    np.testing.assert_array_equal(seen[:, core.actor_size : end], all_of_it[:, whole.actor_size :])
+    count = 2 * (robot.model.nq - 7)
+    begin = ROOT_INPUTS + count
+    np.testing.assert_array_equal(seen[:, end:], all_of_it[:, begin : begin + count])
     np.testing.assert_allclose(
         kept.act(all_of_it[:, : whole.actor_size]),
         learnt.act(seen[:, : core.actor_size]),
         atol=1e-5,
     )
+
+
+def test_a_files_critic_judges_the_whole_observation_as_the_learnt_one_did(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    core = TrackingCore(robot, sway, TRACK, 4, 0)
+    whole = TrackingCore(robot, sway, replace(TRACK, differences=False), 4, 0)
+    rng = np.random.default_rng(5)
+    learnt = rng.normal(0, 0.3, (core.observation_size + robot.model.nu, 6))
+    action = rng.uniform(-1, 1, (4, robot.model.nu))
+    seen, all_of_it = core.reset(), whole.reset()
+    kept = core.mode.of_files(learnt)
+    assert len(kept) == whole.observation_size + robot.model.nu
+    judged = np.concatenate([all_of_it, action], 1) @ kept
+    np.testing.assert_allclose(judged, np.concatenate([seen, action], 1) @ learnt, atol=1e-4)
 
 
 @pytest.mark.medium
