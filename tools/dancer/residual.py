@@ -39,6 +39,8 @@ log = logging.getLogger(__name__)
 
 LEAST_HELD = 0.3
 """Share of its starts from which the feedback, of the exact root, has to hold a motion."""
+BUFFER = 1_000_000
+"""Steps to learn from: of minutes of many motions, not of the last one (2 GB)."""
 MIRRORED = "_mirrored"
 """How the name of a mirror image ends."""
 COLUMNS = ("steps", "survived_s", "site_error_m", "episode_return")
@@ -50,7 +52,7 @@ def configuration(steps: int, seed: int) -> TrainConfig:
     """Return the training: a polish on feedback from the estimated root."""
     law = ControlConfig(feedback_path="sampled")
     track = TrackConfig(observation="onboard", differences=True, control=law)
-    tqc = TqcConfig(preset="polish")
+    tqc = TqcConfig(preset="polish", buffer=BUFFER)
     return TrainConfig(steps=steps, seed=seed, track=track, tqc=tqc)
 
 

@@ -93,7 +93,7 @@ class Runner(NetworkRunner):
         upright = (matrix(turned).T @ matrix(ahead["qpos"][3:7]))[2, 2]
         self.tilt = float(np.arccos(np.clip(upright, -1, 1)))
         qpos, qvel = np.array([0, 0, 0, *turned, *angle]), np.array([0, 0, 0, *gyro, *rate])
-        qpos, qvel = self.state.estimate(ahead, qpos, qvel, self.robot.force())
+        qpos, qvel = self.state.estimate(now, qpos, qvel, self.robot.force())
         mujoco.mj_differentiatePos(self.model, apart, 1.0, now["path_qpos"], qpos)
         feet, _, shares = self.state.points("feet", qpos, qvel, self.cfg["odometry"]["foot_low"])
         apart[:2] -= shares @ (feet - now["places"])[:, :2]

@@ -1,7 +1,7 @@
 """State of a robot from its own measurements: a part of a deploy pack with feedback.
 
-Place and velocity of the root follow from the soles that carry it, which rest or slide as the
-motion's, and from the accelerometer. All in the frame of the motion; m, rad, s.
+Place and velocity of the root follow from the soles that carry it, which rest, roll, slide and sink
+as on the path of the feedback, and from the accelerometer. In the frame of the motion; m, rad, s.
 """
 
 from typing import Any
@@ -27,31 +27,30 @@ class StateEstimator:
         self.place = np.zeros(3)
 
     def estimate(
-        self, ahead: dict[str, Array], qpos: Array, qvel: Array, force: Array
+        self, now: dict[str, Array], qpos: Array, qvel: Array, force: Array
     ) -> tuple[Array, Array]:
         """Return position and velocity with estimates of the root's.
 
         Args:
-            ahead: The motion one step ahead.
+            now: The motion and its path now.
             qpos, qvel: Measured; place and velocity of the root are not read.
             force: The accelerometer, axes of the root.
         """
         rule, axes, low = self.rule, matrix(qpos[3:7]), self.rule["low"]
         qpos[:3] = qvel[:3] = 0.0
         swing = axes @ np.cross(qvel[3:6], self.cfg["imu"])
-        aimed, sliding, _ = self.points("soles", ahead["qpos"], ahead["qvel"], low)
-        sliding = np.where(aimed[:, 2:] < rule["near"], sliding, 0.0) * [1, 1, 0]
+        aimed, moves, _ = self.points("soles", now["path_qpos"], now["path_qvel"], low)
         soles, speeds, shares = self.points("soles", qpos, qvel, low)
-        speed, felt = shares @ (sliding - speeds), ahead["qvel"][:3]
+        speed, felt = shares @ (moves - speeds), now["path_qvel"][:3]
         if self.imu_velocity is None:
             velocity = corrected(felt, speed, 1.0, rule["doubt_speed"])
-            self.place = ahead["qpos"][:3] - self.dt * felt
+            self.place = now["path_qpos"][:3].copy()
         else:
             felt = self.imu_velocity + self.dt * (axes @ force + self.model.opt.gravity) - swing
             velocity = corrected(felt, speed, rule["share"], rule["doubt_speed"])
             self.place = self.place + self.dt * velocity
-        high = corrected(self.place[2:], -soles[:, 2].min(), rule["share"], rule["doubt_height"])
-        self.place[2:], self.imu_velocity = high, velocity + swing
+        self.place[2] = aimed[:, 2].min() - soles[:, 2].min()
+        self.imu_velocity = velocity + swing
         qpos[:3], qvel[:3] = self.place, velocity
         return qpos, qvel
 
@@ -67,9 +66,9 @@ class StateEstimator:
         mujoco.mj_comPos(self.model, self.pose)
         for owner, place, radius in self.cfg[name]:
             body = self.pose.body(owner)
-            centre = body.xpos + body.xmat.reshape(3, 3) @ place
-            mujoco.mj_jac(self.model, self.pose, jacobian, None, centre, body.id)
-            found.append((centre - [0, 0, radius], jacobian @ qvel))
+            lowest = body.xpos + body.xmat.reshape(3, 3) @ place - [0, 0, radius]
+            mujoco.mj_jac(self.model, self.pose, jacobian, None, lowest, body.id)
+            found.append((lowest, jacobian @ qvel))
         points, speeds = np.array(found).swapaxes(0, 1)
         shares = np.exp(-(points[:, 2] - points[:, 2].min()) / low)
         return points, speeds, shares / shares.sum()

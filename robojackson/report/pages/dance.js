@@ -86,39 +86,34 @@ const Dance = (() => {
       const own = matrixOf(qpos, 3), spin = [0, 1, 2].map((k) => own[3 * k] * qvel[3] + own[3 * k + 1] * qvel[4] + own[3 * k + 2] * qvel[5]);
       return this.soles.map(({ body, centre, radius, joints }) => {
         const turn = matrixOf(data.xquat, 4 * body), place = [0, 1, 2].map((k) => data.xpos[3 * body + k] + turn[3 * k] * centre[0] + turn[3 * k + 1] * centre[1] + turn[3 * k + 2] * centre[2]);
+        place[2] -= radius;
         const speed = cross(spin, place.map((value, k) => value - qpos[k]));
         for (const joint of joints) {
           const arm = place.map((value, k) => value - data.xanchor[3 * joint + k]), move = cross([0, 1, 2].map((k) => data.xaxis[3 * joint + k]), arm);
           for (let k = 0; k < 3; k++) speed[k] += move[k] * qvel[this.model.jnt_dofadr[joint]];
         }
         if (whole) for (let k = 0; k < 3; k++) speed[k] += qvel[k];
-        return { height: place[2] - radius, speed };
+        return { height: place[2], speed };
       });
     }
 
-    /* One control step of dt seconds; the reference is that of the next step. */
-    estimate(data, dt, reference, ghost) {
+    /* One control step of dt seconds; the path is the state that the feedback keeps the robot in, now. */
+    estimate(data, dt, path, ghost) {
       const { rule } = this, { qpos, qvel } = data, own = matrixOf(qpos, 3), inside = cross([3, 4, 5].map((k) => qvel[k]), rule.imu);
       const swing = [0, 1, 2].map((k) => own[3 * k] * inside[0] + own[3 * k + 1] * inside[1] + own[3 * k + 2] * inside[2]);
-      const aims = this.at(ghost, reference.qpos, reference.qvel, true), soles = this.at(data, qpos, qvel, false);
+      const aims = this.at(ghost, path.qpos, path.qvel, true), soles = this.at(data, qpos, qvel, false);
       const floor = Math.min(...soles.map((sole) => sole.height)), carries = soles.map((sole) => Math.exp((floor - sole.height) / rule.low)), all = carries.reduce((a, b) => a + b);
-      const measured = [0, 1, 2].map((k) => soles.reduce((sum, sole, i) => {
-        const slides = k < 2 && aims[i].height < rule.near ? aims[i].speed[k] : 0;
-        return sum + carries[i] * (slides - sole.speed[k]);
-      }, 0) / all);
-      const felt = [0, 1, 2].map((k) => qvel[k] + swing[k]), aim = Array.from(reference.qvel.slice(0, 3));
-      let velocity, height;
+      const measured = [0, 1, 2].map((k) => soles.reduce((sum, sole, i) => sum + carries[i] * (aims[i].speed[k] - sole.speed[k]), 0) / all);
+      const felt = [0, 1, 2].map((k) => qvel[k] + swing[k]), height = qpos[2] - floor + Math.min(...aims.map((aim) => aim.height));
+      let velocity;
       if (!this.last) {
-        velocity = corrected(aim, measured, 1, rule.doubt_speed);
-        height = reference.qpos[2] - dt * aim[2];
+        velocity = corrected(Array.from(path.qvel.slice(0, 3)), measured, 1, rule.doubt_speed);
       } else {
         const assumed = [0, 0, dt * (this.gravity - this.model.opt.gravity[2])];
         const predicted = felt.map((value, k) => this.last.known[k] + value - this.last.felt[k] + assumed[k] + dt * this.noise * normal() - swing[k]);
         velocity = corrected(predicted, measured, rule.share, rule.doubt_speed);
-        height = this.last.height + dt * velocity[2];
       }
-      [height] = corrected([height], [qpos[2] - floor], rule.share, rule.doubt_height);
-      this.last = { felt, known: velocity.map((value, k) => value + swing[k]), height };
+      this.last = { felt, known: velocity.map((value, k) => value + swing[k]) };
       return { height, velocity };
     }
   }
@@ -249,10 +244,12 @@ const Dance = (() => {
 
     /* Height and velocity of the root as the robot knows them. */
     known() {
-      const reference = this.state(this.step + 1);
-      this.ghost.qpos.set(reference.qpos);
+      const { nq, nv, feedback } = this, { row, moved } = this.at(this.step);
+      const qpos = feedback.qpos.slice(row * nq, (row + 1) * nq), qvel = feedback.qvel.slice(row * nv, (row + 1) * nv);
+      for (let k = 0; k < 3; k++) qpos[k] += moved[k];
+      this.ghost.qpos.set(qpos);
       this.mujoco.mj_kinematics(this.model, this.ghost);
-      return this.odometry.estimate(this.data, this.dance.dt, reference, this.ghost);
+      return this.odometry.estimate(this.data, this.dance.dt, { qpos, qvel }, this.ghost);
     }
 
     /* How far the feet that stand are from their places in the plane of the floor, as `standing_feet.Feet`. */

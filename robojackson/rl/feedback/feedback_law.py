@@ -70,6 +70,14 @@ class Feedback:
         """Places of the feet at every step, also of motions that are followed where they are."""
         return self.feet.places(self.gains.qpos)
 
+    def path(
+        self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]
+    ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return the nominal states at rows of the joined motions, moved by `shift`, m."""
+        qpos = self.gains.qpos[row]
+        qpos[:, :3] += shift
+        return qpos, self.gains.qvel[row]
+
     def at(
         self,
         row: Int[np.ndarray, " N"],
@@ -84,8 +92,6 @@ class Feedback:
                 sampled path is always followed.
         """
         gains = self.gains
-        qpos = gains.qpos[row]
-        qpos[:, :3] += shift
-        found = (gains.gain[row], gains.offset[row], qpos, gains.qvel[row])
+        found = (gains.gain[row], gains.offset[row], *self.path(row, shift))
         places = (self.footholds if beside_feet else gains.places)[row] + shift[:, None]
         return StepFeedback(*found, self.limit, self.feet, places)

@@ -145,19 +145,12 @@ class Clip:
 
     def _feedback(self, step: np.ndarray) -> StepCorrection | None:
         """Return the feedback on the way to each step."""
-        law = self._law
-        if law is None:
-            return None
+        return None if self._law is None else _Correction(self._law, self, step)
 
-        def targets(
-            qpos: Float[np.ndarray, "N nq"],
-            qvel: Float[np.ndarray, "N nv"],
-            beside_feet: bool = False,
-        ) -> Float[np.ndarray, "N nu"]:
-            row, shift, _ = self._split(step - 1)
-            return law.at(row, shift, beside_feet).targets(qpos, qvel)
-
-        return targets
+    def before(self, step: Int[np.ndarray, " N"]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the row of the step before each, and the displacement by its cycles."""
+        row, shift, _ = self._split(step - 1)
+        return row, shift
 
     def gather(
         self, values: Float[np.ndarray, "S P 3"], step: Int[np.ndarray, " N"]
@@ -191,6 +184,28 @@ class Clip:
         index = np.minimum(index - cycle * length, length - 1)
         shift: np.ndarray = cycle[:, None] * self._offset[motion]
         return self._first[motion] + index, shift, index / length
+
+
+@dataclass(frozen=True)
+class _Correction:
+    """The feedback of N robots on the way to a step (`StepCorrection` protocol)."""
+
+    law: Law
+    clip: Clip
+    step: Int[np.ndarray, " N"]
+
+    def __call__(
+        self,
+        qpos: Float[np.ndarray, "N nq"],
+        qvel: Float[np.ndarray, "N nv"],
+        beside_feet: bool = False,
+    ) -> Float[np.ndarray, "N nu"]:
+        """Return the offsets of the targets, rad."""
+        return self.law.at(*self.clip.before(self.step), beside_feet).targets(qpos, qvel)
+
+    def path(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return the states that the feedback keeps robots in, before the step."""
+        return self.law.path(*self.clip.before(self.step))
 
 
 def require_usable(motion: ReferenceMotion) -> None:

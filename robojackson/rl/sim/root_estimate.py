@@ -8,7 +8,6 @@ from jaxtyping import Float, Int
 
 from robojackson.rl.sim.accelerometer import Accelerometer, Moving
 from robojackson.rl.sim.leg_odometry import LegOdometry, RootState
-from robojackson.rl.sim.reference_clip import ClipStep
 from robojackson.robot.model import Robot
 
 PARTS = ("place", "velocity", "imu_velocity")
@@ -45,21 +44,21 @@ class RootEstimate:
         self,
         qpos: Float[np.ndarray, "N nq"],
         qvel: Float[np.ndarray, "N nv"],
-        step: ClipStep,
+        path: tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]],
         noise: Float[np.ndarray, "N 3"],
     ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
         """Return the states with the estimates of the root's place and velocity.
 
         Args:
             qpos, qvel: As the sensors measure them; place and velocity of the root are not read.
-            step: The next step of the reference.
+            path: States that the feedback keeps the robots in, now.
             noise: Of the accelerometers (`Accelerometer.read`).
         """
         stale = ~self._current
         if stale.any():
             before = self._odometry.now
             force = None if before is None else self._accelerometer.read(self.noise * noise)
-            found = self._odometry.estimate(qpos, qvel, force, step, self._begins)
+            found = self._odometry.estimate(qpos, qvel, force, path, self._begins)
             qpos, qvel = (
                 np.where(stale[:, None], new, old)
                 for new, old in zip(found, self._estimate, strict=True)

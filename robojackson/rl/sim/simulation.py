@@ -198,7 +198,7 @@ class Simulation:
         """Return the target hinge angles of a reference step without a policy, rad."""
         angles = step.angles(self.motors.hinge)
         if step.feedback is not None and self.control.feedback:
-            angles = angles + self._correction(step, step.feedback)
+            angles = angles + self._correction(step.feedback)
         return angles
 
     def close(self) -> None:
@@ -206,12 +206,13 @@ class Simulation:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _correction(self, step: ClipStep, feedback: StepCorrection) -> Float[np.ndarray, "N nu"]:
+    def _correction(self, feedback: StepCorrection) -> Float[np.ndarray, "N nu"]:
         """Return the offsets of the targets by the feedback, rad."""
         if self.root_estimate is None:
             return feedback(*self.sensed())
         noise = self._disturbances.accelerometer_noise()
-        return feedback(*self.root_estimate.of(*self.sensed(), step, noise), beside_feet=True)
+        estimate = self.root_estimate.of(*self.sensed(), feedback.path(), noise)
+        return feedback(*estimate, beside_feet=True)
 
     def _batches(self, lo: int, hi: int) -> list[tuple[int, int, Batch]]:
         """Return the copies of one thread, a batch at a time."""

@@ -26,6 +26,9 @@ class StepCorrection(Protocol):
     ) -> Float[np.ndarray, "N nu"]:
         """Return `StepLaw.targets` of `Law.at`."""
 
+    def path(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return `Law.path`."""
+
 
 class Law(Protocol):
     """A feedback along the joined motions of a clip (`feedback.Feedback`)."""
@@ -41,6 +44,12 @@ class Law(Protocol):
         Args:
             beside_feet: Whether to follow the motion from where the feet of each robot stand.
         """
+
+    def path(
+        self, row: Int[np.ndarray, " N"], shift: Float[np.ndarray, "N 3"]
+    ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
+        """Return the states that the feedback keeps robots in, at rows whose cycles have moved them
+        by `shift`, m."""
 
     @property
     def outline(self) -> Float[np.ndarray, "M J"]:

@@ -106,7 +106,7 @@ class _EstimatingFollower(_RegulatorFollower):
 
     def correction(self, seen: TrackerInput, feedback: StepCorrection) -> np.ndarray:
         """Return the offsets by what is measured and, of the root, estimated, rad."""
-        state = self._odometry.estimate(seen.qpos, seen.qvel, seen.force, seen.window[-1])
+        state = self._odometry.estimate(seen.qpos, seen.qvel, seen.force, feedback.path())
         return feedback(*state, beside_feet=True)
 
 
