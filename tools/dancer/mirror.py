@@ -20,6 +20,8 @@ from robojackson.robot.model import Robot
 
 ACROSS = np.array([1.0, -1.0, 1.0])
 """Of places; of rotation vectors it is the other way round."""
+TURN = np.array([1.0, *-ACROSS])
+"""Of quaternions."""
 
 
 def hinge_partners(robot: Robot) -> tuple[Int[np.ndarray, " J"], Float[np.ndarray, " J"]]:
@@ -46,11 +48,9 @@ class Images:
     """Images of a robot's states, motions and feedback. World frame, metres, radians."""
 
     def __init__(self, robot: Robot) -> None:
-        self._robot = robot
         self._hinge, self._sign = hinge_partners(robot)
         motors = Motors.of(robot.model).hinge
-        place = {int(hinge): motor for motor, hinge in enumerate(motors)}
-        self._motor = np.array([place[int(self._hinge[hinge])] for hinge in motors])
+        self._motor = np.argsort(motors)[self._hinge[motors]]
         self._motor_sign = self._sign[motors]
         names = [robot.model.site(int(site)).name for site in foot_sites(robot)]
         self._foot = partners(tuple(names))
@@ -86,10 +86,9 @@ class Images:
         )
 
     def _qpos(self, qpos: Float[np.ndarray, "S nq"]) -> Float[np.ndarray, "S nq"]:
-        of_quat = np.concatenate([[1.0], -ACROSS])
         parts = [
             qpos[:, :3] * ACROSS,
-            qpos[:, 3:7] * of_quat,
+            qpos[:, 3:7] * TURN,
             self._sign * qpos[:, 7:][:, self._hinge],
         ]
         return np.concatenate(parts, 1)
