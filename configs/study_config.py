@@ -24,7 +24,7 @@ OF_THE_STUDY = (
     "render",
 )
 """Keys of the pipeline's configuration that are no part of a motion."""
-Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity"]
+Setup = Literal["scratch", "pretrain", "curiosity", "scratch-curiosity", "pretrained-dancer"]
 Executor = Literal["local", "work-pool"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$", max_length=60)]
 Seed = Annotated[int, Field(ge=0)]

@@ -19,6 +19,8 @@ COMPARED = (
     ("curiosity", "pretrain"),
 )
 """Pairs of setups with one difference: two in pretraining, two in curiosity."""
+ON_MANY = ("pretrained-dancer", "scratch")
+"""A pair of studies whose pretraining was on many motions, of which the paper has none."""
 Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 
@@ -61,7 +63,8 @@ def claims(
     walking: Mapping[str, bool],
     rng: np.random.Generator,
 ) -> list[Claim]:
-    """Return the paper's three claims, and the same two effects where the others are absent.
+    """Return the paper's three claims, and the same two effects where the others are absent; with
+    a dancer, whether starting from it helps.
 
     Args:
         figures: The figure of each seed, by (move, setup); higher is better.
@@ -78,6 +81,8 @@ def claims(
         ("Curiosity hurts on walking, without pretraining", *alone, -1, walks),
         ("Pretraining helps, with curiosity", "curiosity", "scratch-curiosity", 1, every),
     ]  # fmt: skip
+    if _has_dancer(figures):
+        questions.append(("Pretraining on many motions helps", *ON_MANY, 1, every))
     return [_claim(figures, *question, rng) for question in questions]
 
 
@@ -87,16 +92,21 @@ def comparisons(
     rng: np.random.Generator,
 ) -> list[Comparison]:
     """Return the four effects of the 2 x 2 on every move alone, where a mean over moves may hide
-    that one gains what another loses.
+    that one gains what another loses; with a dancer, its effect as well.
     """
+    pairs = (*COMPARED, ON_MANY) if _has_dancer(figures) else COMPARED
     return [
         Comparison(
             treated,
             control,
             {move: _effect(figures, treated, control, [move], rng) for move in moves},
         )
-        for treated, control in COMPARED
+        for treated, control in pairs
     ]
+
+
+def _has_dancer(figures: Mapping[tuple[str, str], Mapping[int, float]]) -> bool:
+    return any(setup == ON_MANY[0] for _, setup in figures)
 
 
 def _effect(

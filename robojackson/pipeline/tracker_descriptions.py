@@ -57,7 +57,8 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     """
     if name == NONE:
         return None
-    known = trackers_of(robot) if name is None else [describe_tracker(name)]
+    usual = [each for each in trackers_of(robot) if each.by_default]
+    known = usual if name is None else [describe_tracker(name)]
     if not known:
         every = [f"{each.name} ({each.robot})" for each in map(describe_tracker, tracker_names())]
         raise BadPolicy(

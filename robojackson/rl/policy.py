@@ -115,6 +115,15 @@ def _count(value: object) -> int | None:
     return value if isinstance(value, int) and 0 <= value < 2**31 else None
 
 
+def holds_policy(path: Path) -> bool:
+    """Return whether a file is a policy of ours, by its header alone."""
+    try:
+        with safe_open(path, framework="np") as file:
+            return FORMAT in (file.metadata() or {})
+    except (OSError, SafetensorError):
+        return False
+
+
 def load_policy(path: Path) -> Policy:
     """Read a policy file.
 

@@ -1,4 +1,5 @@
-"""The networks that a training may start from: our walkers, a run of ours, or any SB3 zip of TQC.
+"""The networks that a training may start from: our walkers, our dancer, a run or policy of ours, or
+any SB3 zip of TQC.
 
 An SB3 zip holds pickled objects beside its weights. Only `policy.pth` is read, by torch's
 weights-only reader, and the JSON beside it as text; nothing is unpickled.
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from robojackson.errors import BadPolicy, MissingDependency
+from robojackson.rl.policy import holds_policy, load_policy
 from robojackson.rl.tqc.network_arrays import (
     CRITICS,
     TARGETS,
@@ -24,7 +26,7 @@ from robojackson.rl.tqc.network_arrays import (
     load_networks,
     require_complete,
 )
-from robojackson.rl.walkers import shipped_walker, walker_file
+from robojackson.rl.walkers import shipped_dancer, shipped_walker, walker_file
 from robojackson.robot.description import RobotDescription
 
 log = logging.getLogger(__name__)
@@ -45,7 +47,9 @@ def pretrained(start: str, mode: str, robot: RobotDescription | None = None) -> 
     path = start_file(start, mode, robot)
     if path is None:
         return None
-    return from_sb3_zip(path) if zipfile.is_zipfile(path) else load_networks(path)
+    if zipfile.is_zipfile(path):
+        return from_sb3_zip(path)
+    return from_policy(path) if holds_policy(path) else load_networks(path)
 
 
 def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> Path | None:
@@ -54,13 +58,15 @@ def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> 
         return None
     if start == "walker":
         return shipped_walker(mode) if robot is None else walker_file(robot, mode)
+    if start == "dancer":
+        return shipped_dancer(robot)
     path = Path(start)
     if path.is_file():
         return path
     if not HUB.match(start):
         raise BadPolicy(
-            f"start {start!r}: no such file; use scratch, walker, a networks.safetensors, "
-            "an SB3 zip, or owner/name of the hub"
+            f"start {start!r}: no such file; use scratch, walker, dancer, a networks.safetensors, "
+            "a policy.safetensors, an SB3 zip, or owner/name of the hub"
         )
     return from_hub(start)
 
@@ -85,6 +91,20 @@ def from_hub(repository: str) -> Path:
             f"start {repository!r} cannot be fetched from the hub ({type(error).__name__}); "
             "download its zip elsewhere and give its path"
         ) from error
+
+
+def from_policy(path: Path) -> Networks:
+    """Return the actor of a policy file of ours, which has no critics.
+
+    Raises:
+        BadPolicy: the file is damaged.
+    """
+    policy = load_policy(path)
+    names = [*(f"actor.{i}" for i in range(len(policy.layers) - 1)), "mean"]
+    tensors: Tensors = {}
+    for name, (weight, bias) in zip(names, policy.layers, strict=True):
+        tensors |= {f"{name}.weight": weight, f"{name}.bias": bias}
+    return require_complete(Networks(tensors, policy.facts), path)
 
 
 def from_sb3_zip(path: Path) -> Networks:

@@ -27,7 +27,13 @@ from robojackson.rl.modes.track_mode import control_of, is_fed
 from robojackson.rl.policy import load_policy
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path
-from robojackson.rl.tqc.network_arrays import Networks, chosen, fitted
+from robojackson.rl.tqc.network_arrays import (
+    Networks,
+    chosen,
+    fitted,
+    widened,
+    with_exploration,
+)
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained
 from robojackson.rl.training_run import Run
@@ -71,6 +77,8 @@ def train_policy(
     core = TrackingCore(robot, reference, environment, *of_tqc, hooks.rewards)
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
+    if networks is not None:
+        networks = _of_whole_observation(networks, core)
     if networks is None:
         tqc = residual_learning(config, robot, reference, held)
     else:
@@ -78,7 +86,8 @@ def train_policy(
     seen = core.actor_size if core.actor_size < core.observation_size else None
     trainer = make_trainer(config.trainer, env, tqc, config.seed, seen)
     if networks is not None:
-        trainer.start_from(chosen(networks, config.start_critics).tensors)
+        started = chosen(networks, config.start_critics)
+        trainer.start_from(with_exploration(started, tqc).tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
     try:
@@ -180,6 +189,12 @@ def polishes(
     better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)
     chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
     return usual and chosen and fed and better
+
+
+def _of_whole_observation(networks: Networks, core: TrackingCore) -> Networks:
+    """Return an actor that has inputs for what the critics alone see, as the trainers keep it."""
+    is_policy = networks.observation_size == core.actor_size and not networks.has_critics
+    return widened(networks, core.observation_size) if is_policy else networks
 
 
 def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:

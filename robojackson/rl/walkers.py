@@ -1,19 +1,22 @@
-"""The walker of a robot: the networks that a training with `start: walker` begins from.
+"""The shipped networks that a training begins from: walkers (`start: walker`), and the dancer.
 
 The shipped walkers were trained on one robot. `robojackson pretrain --robot NAME` saves that of any
-other robot beside the added robots, by the robot's name, the digest of its model and the mode.
+other robot beside the added robots, by the robot's name, the digest of its model and the mode. The
+dancer (`start: dancer`) was trained on many motions, for one robot.
 """
 
 from pathlib import Path
 
 from robojackson.errors import BadPolicy
 from robojackson.files.file_tree import FileTree
+from robojackson.rl.policy import load_policy
 from robojackson.rl.tqc.network_arrays import load_networks
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.mjcf import mjcf_path, model_sha256, robots_folder
 
 ASSETS = Path(__file__).parent.parent / "assets"
 WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
+DANCER = "dancer_g1.safetensors"
 FOLDER = "pretrain"
 DIGITS = 12
 """Number of digits of the model's digest in the name of a walker's folder."""
@@ -32,6 +35,23 @@ def is_shipped(robot: RobotDescription, mode: str) -> bool:
     """
     facts = load_networks(shipped_walker(mode)).facts
     return facts.get("robot") == robot.name or facts.get("model_sha256") == _model(robot)
+
+
+def shipped_dancer(robot: RobotDescription | None) -> Path:
+    """Return the file of the dancer, which was trained on many motions of one robot.
+
+    Raises:
+        BadConfiguration: the model of the robot is not installed.
+        BadPolicy: it was trained on another robot.
+    """
+    path = ASSETS / DANCER
+    facts = load_policy(path).facts
+    if robot is None or facts.get("model_sha256") != _model(robot):
+        given = "another one" if robot is None else repr(robot.name)
+        raise BadPolicy(
+            f"start 'dancer' is for robot {facts.get('robot')!r}, not {given}: use scratch, walker"
+        )
+    return path
 
 
 def walker_file(robot: RobotDescription, mode: str) -> Path:

@@ -173,7 +173,7 @@ def test_a_cell_that_would_stand_twice_in_a_study_is_refused(
         load(Study, "studies/smoke", wrong)
 
 
-@pytest.mark.parametrize("name", ["paper", "smoke", "g1"])
+@pytest.mark.parametrize("name", ["paper", "smoke", "g1", "dancer"])
 def test_a_deployment_is_the_study_of_its_name_on_workers(name: str) -> None:
     entries = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
     (ours,) = [e for e in entries if e["entrypoint"].endswith(".ablation") and e["name"] == name]

@@ -116,5 +116,14 @@ def test_an_effect_whose_interval_spans_zero_is_not_shown() -> None:
     assert claim.verdict == "not shown"
 
 
+def test_a_start_from_many_motions_is_a_claim_where_it_was_trained() -> None:
+    many = "Pretraining on many motions helps"
+    assert verdicts(scratch=0.1, pretrained_dancer=0.4)[many] == "holds"
+    assert many not in verdicts(scratch=0.1, pretrain=0.4)
+    for setups, pairs in (({"pretrained_dancer": 0.4}, 5), ({"pretrain": 0.4}, 4)):
+        found = ablation_statistics.comparisons(figures(scratch=0.1, **setups), ["walk"], RNG(0))
+        assert len(found) == pairs
+
+
 def test_a_setup_that_was_not_trained_is_not_measured() -> None:
     assert verdicts(scratch=0.1, pretrain=0.4)["Curiosity helps on dances"] == "not measured"

@@ -47,8 +47,10 @@ class TrainConfig:
         steps: Policy steps over all simulations, rounded up to a round of updates.
         minutes: Wall time, minutes.
         cpu_minutes: Processor time, all threads together, minutes.
-        start: Source of the networks: `scratch`, our `walker` of the mode, a networks.safetensors,
-            an SB3 zip, or a repository of the hub (`owner/name`).
+        start: Source of the networks: `scratch`, our `walker` of the mode, our `dancer` of the
+            Unitree G1 (an actor alone; `track.observation=preview`), a networks.safetensors, a
+            policy.safetensors (an actor alone), an SB3 zip, or a repository of the hub
+            (`owner/name`).
         start_critics: Whether the critics come from the same source.
         polish: Whether the training starts from what the feedback alone does and improves it
             (preset `polish` of TQC). `auto`: from scratch, on a robot whose feedback follows a

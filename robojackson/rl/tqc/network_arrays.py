@@ -187,6 +187,19 @@ def chosen(networks: Networks, critics: bool) -> Networks:
     return replace(networks, tensors=kept)
 
 
+def with_exploration(networks: Networks, config: TqcConfig) -> Networks:
+    """Return the networks with the exploration noise of a training (`log_std_init`), where an actor
+    has none of its own; gSDE has no such head."""
+    if "log_std.weight" in networks.tensors or config.gsde:
+        return networks
+    mean = networks.tensors["mean.weight"]
+    head = {
+        "log_std.weight": np.zeros_like(mean),
+        "log_std.bias": np.full(mean.shape[1], config.log_std_init, np.float32),
+    }
+    return replace(networks, tensors={**networks.tensors, **head})
+
+
 def widened(networks: Networks, observation_size: int) -> Networks:
     """Return the same networks for an observation that is longer; the new inputs have weight
     zero."""

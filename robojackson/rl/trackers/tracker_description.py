@@ -52,6 +52,7 @@ class TrackerDescription:
         control_dt: Seconds a control step.
         timestep: Seconds a physics step, where the PD law with these gains is not stable at the
             robot's own; the robot's when null.
+        by_default: Whether to select it at all where no tracker is named.
         action_scale: Radians that an action of 1 moves a hinge's target from the default pose.
         action_limit: Largest magnitude of an action, unitless.
         joints: Hinges in the order of observation and action.
@@ -72,6 +73,7 @@ class TrackerDescription:
     file: TrackerFile | None = None
     root_state: Literal["exact", "estimated"] = "exact"
     fallback: bool = False
+    by_default: bool = True
     action_scale: Positive = 1.0
     action_limit: Positive = 1.0
     joints: tuple[str, ...] = ()

@@ -13,8 +13,8 @@ from tests.fixtures.commands import Said, in_process
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_network, write_yaml
 from tests.fixtures.web_server import Web, serving
 
-FEEDBACK = {"regulator": True, "regulator_onboard": True}
-"""Trackers without a file, which are always here."""
+FEEDBACK = {"dancer": True, "regulator": True, "regulator_onboard": True}
+"""Trackers without a file, or with one that ships, which are always here."""
 
 
 @pytest.fixture
