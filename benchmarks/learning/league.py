@@ -19,9 +19,11 @@ from typing import Any
 from benchmarks.learning.error_line import errors_in_one_line
 from benchmarks.learning.league_rows import (
     COLUMNS,
+    DANCER,
     FIGURES,
     INSTANT,
     INSTANT_ONBOARD,
+    OF_DANCER,
     OF_MOTION,
     OF_OTHERS,
     ONBOARD,
@@ -50,6 +52,12 @@ FIRST, STEPS = {"fastsac": 2100, "ppo": 2000}, 500
 MODELS = "holosoma_inference/models/wbt"
 EVALUATION = EvaluateConfig(resets=1)
 NOT_OURS = "we trained nothing on holosoma's motion, which comes with its wheel alone"
+NOT_ITS_OWN = {
+    TWIST2: ("twist2", {**OF_OTHERS, "in_training": "likely"}),
+    DANCER: ("dancer", OF_DANCER),
+    REPLAY: (REPLAY, OF_MOTION),
+}
+"""Names of others' trackers on holosoma's motion by their rows, and what is known of them."""
 MISSING = {
     **dict.fromkeys((INSTANT, INSTANT_ONBOARD), "gains not computed for this motion"),
     TRAINED: NOT_OURS,
@@ -76,6 +84,8 @@ reference; figures are means over all starts, those of trainings over all seeds,
   without feedback (on holosoma's motion: with the gains of its PPO policy).
 - **`regulator_onboard`** is the same feedback, whose place and velocity of the root are estimated
   from joints, attitude, gyroscope and accelerometer.
+- **`dancer`** is our one network for any motion, from a robot's own measurements
+  (`docs/learning_g1.md`, "One policy for many motions").
 """
 
 
@@ -103,7 +113,7 @@ def on_holosomas(held: Mapping[str, Row], wheel: Path | None) -> Iterator[Row]:
     """Yield every row of holosoma's motion; what is held is not measured again."""
     measurements: dict[str, Callable[[], Row]] = {
         **{f"holosoma {kind}": partial(on_its_own, kind, wheel) for kind in FIRST},
-        **{who: partial(other_on_theirs, who, wheel) for who in (TWIST2, REPLAY)},
+        **{who: partial(other_on_theirs, who, wheel) for who in NOT_ITS_OWN},
     }
     for who, measure in measurements.items():
         yield held[who] if who in held else measure()
@@ -121,16 +131,15 @@ def on_its_own(kind: str, wheel: Path | None) -> Row:
 
 
 def other_on_theirs(who: str, wheel: Path | None) -> Row:
-    """Return the row of TWIST2, or of the replay, on holosoma's motion."""
-    policy = peer("ppo", wheel)
+    """Return the row of a network, or of the replay, on holosoma's motion."""
+    policy, (name, known) = peer("ppo", wheel), NOT_ITS_OWN[who]
     try:
-        tracker = policy if who == REPLAY else present(who)
+        tracker = policy if who == REPLAY else present(name)
     except MissingDependency:
         tracker = None
     if policy is None or tracker is None:
         return row(who, OWN_MOTION, why="holosoma-inference or the tracker is not here")
     mine, replayed = evaluated(tracker, policy, "ppo")
-    known = OF_MOTION if who == REPLAY else {**OF_OTHERS, "in_training": "likely"}
     return row(who, OWN_MOTION, replayed if who == REPLAY else mine, **known)
 
 

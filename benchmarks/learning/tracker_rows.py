@@ -170,7 +170,8 @@ def present(name: str) -> Tracker | None:
         return bare_replay()
     description = describe_tracker(name)
     folder = os.environ.get(FILES)
-    file = Path(folder) / description.file.name if folder and description.file else None
+    pinned = description.file
+    file = Path(folder) / pinned.name if folder and pinned and pinned.url else None
     try:
         return open_tracker(description, file)
     except BadPolicy as cause:

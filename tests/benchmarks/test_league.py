@@ -29,7 +29,7 @@ def test_every_motion_has_one_row_of_every_dancer() -> None:
         onboard = league_rows.ONBOARD if scratch else league_rows.TRAINED_ONBOARD
         assert {who for found, who in counts if found == motion} == {
             *(league_rows.INSTANT, league_rows.INSTANT_ONBOARD, league_rows.TWIST2),
-            *(league_rows.REPLAY, trained),
+            *(league_rows.DANCER, league_rows.REPLAY, trained),
             *(league_rows.SCRATCH, onboard, league_rows.POLISHED),
         }
 
@@ -87,7 +87,8 @@ def test_what_was_computed_for_the_motion_itself_has_seen_it() -> None:
 def test_rows_of_holosoma_s_motion_are_held_and_the_missing_ones_give_a_reason() -> None:
     held = league.held_in(FOLDERS.results / "league.json")
     rows = {row["who"]: row for row in league.on_holosomas(held, wheel=None)}
-    assert {"holosoma ppo", "holosoma fastsac", "twist2", league_rows.REPLAY} == set(held)
+    networks = {"holosoma ppo", "holosoma fastsac", "twist2", league_rows.DANCER}
+    assert networks | {league_rows.REPLAY} == set(held)
     assert all(rows[who]["why"] for who in rows if who not in held)
     assert {league_rows.SCRATCH, league_rows.TRAINED} <= set(rows)
     assert {row["starts"] for row in held.values()} == {25}

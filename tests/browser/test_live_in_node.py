@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.tracker_descriptions import describe_tracker
 from robojackson.report.web.live_data import live_data
 from robojackson.report.web.live_records import RECORDS
 from robojackson.report.web.shown_run import RecordedRun
@@ -24,8 +25,10 @@ from robojackson.rl.feedback.regulator import regulator
 from robojackson.rl.feedback.standing_feet import Feet
 from robojackson.rl.modes.observation import AHEAD, Kind, Observer
 from robojackson.rl.policy import Policy
+from robojackson.rl.sim import accelerometer
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from tests.browser.conftest import made_policy
@@ -161,6 +164,27 @@ def test_feedback_from_an_estimated_root_is_the_same_as_in_python(
     fed["odometry"]["imu"] = [1.0, 1.0, 0.0]
     without = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
     assert np.median(without["deviations"]) > np.median(found["deviations"])
+
+
+def test_the_tracker_of_an_estimated_root_is_the_same_as_in_python(
+    shaking: RecordedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
+    monkeypatch.setattr(accelerometer, "NOISE_M_S2", 0.0)
+    described = replace(
+        describe_tracker("regulator_onboard"), robot="humanoid", control_dt=shaking.reference.dt
+    )
+    tracker = RegulatorTracker(described)
+    tracker.control = replace(tracker.control, feedback_path="reference")
+    data = live_data(tracker, shaking.reference, shaking.robot)
+    assert data is not None
+    assert data["layers"] == []
+    assert data["feedback"]["odometry"]  # type: ignore[index]
+    found = in_node(data, np.zeros((RECORDS, 2)), tmp_path)
+    assert found["deviations"].max() <= NEAR_MM
+    ours = in_python(replace(shaking, policy=tracker), data, np.zeros((RECORDS, 2)))
+    assert found["found"][:, 0].mean() == pytest.approx(ours[:, 0].mean(), abs=2.0)
+    assert found["found"][:, 1].mean() == pytest.approx(ours[:, 1].mean(), abs=0.002)
 
 
 def test_feedback_from_where_the_feet_stand_is_the_same_as_in_python(

@@ -10,10 +10,10 @@ import numpy as np
 from robojackson.formats.deploy.deployed_feedback import soles_of
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.web.live_model import live_model
-from robojackson.report.web.live_records import live_records
+from robojackson.report.web.live_records import live_records, shown_control
 from robojackson.report.web.shapes import packed, robot_shape
 from robojackson.rl.config.train_config import ControlConfig
-from robojackson.rl.evaluation.controllers import Evaluated, control_of, sees_ahead
+from robojackson.rl.evaluation.controllers import Evaluated, sees_ahead
 from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.standing_feet import LOW_M
 from robojackson.rl.modes.observation import (
@@ -50,7 +50,7 @@ def live_data(
     """
     if not runs_in_a_browser(policy):
         return None
-    control, network = control_of(policy, robot), _network(policy)
+    control, network = shown_control(policy, robot), _network(policy)
     if control.law != "pd" or _has_colliding_meshes(robot.model):
         return None
     seen = None if network is None else observation_of(network)
@@ -99,12 +99,11 @@ def live_data(
 
 
 def runs_in_a_browser(policy: Evaluated) -> bool:
-    """Return whether a policy's network is one of ours without extras, or it has none; the tracker
-    of an estimated root, whose control law is its own, is not among them."""
+    """Return whether a policy's network is one of ours without extras, or it has none."""
     if isinstance(policy, Policy):
         return mode_of(policy) == "track"
     if isinstance(policy, RegulatorTracker):
-        return policy.description.root_state == "exact"
+        return policy.policy is None
     return isinstance(policy, PolicyTracker)
 
 

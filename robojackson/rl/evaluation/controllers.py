@@ -53,7 +53,7 @@ def drivers(
     if control.law == "pd" and isinstance(policy, Policy):
         found[HOLD] = replace(found[TRAINED], control=replace(control, law="hold"))
         if resolved(control, robot).feedback:
-            found[REGULATOR] = Driver(control, _follow)
+            found[REGULATOR] = feedback_driver(control)
     usual = control if control.law == "pd" else ControlConfig(substeps=control.substeps)
     return found | _baselines(reference, robot, replace(usual, feedback=0.0), seed)
 
@@ -67,6 +67,11 @@ def trained_driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) 
     if not isinstance(policy, Policy):
         return tracker_driver(policy, robot, reference)
     return _trained(policy, robot, control_of(policy, robot))
+
+
+def feedback_driver(control: ControlConfig) -> Driver:
+    """Return the driver of a control law alone: of its feedback, without a network."""
+    return Driver(control, _follow)
 
 
 def _trained(policy: Policy, robot: Robot, control: ControlConfig) -> Driver:
