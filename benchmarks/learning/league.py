@@ -57,7 +57,7 @@ NOT_ITS_OWN = {
     DANCER: ("dancer", OF_DANCER),
     REPLAY: (REPLAY, OF_MOTION),
 }
-"""Names of others' trackers on holosoma's motion by their rows, and what is known of them."""
+"""Name of a tracker by its row on holosoma's motion, and the facts of that row."""
 MISSING = {
     **dict.fromkeys((INSTANT, INSTANT_ONBOARD), "gains not computed for this motion"),
     TRAINED: NOT_OURS,

@@ -59,7 +59,7 @@ OF_MOTION = {"data": "the motion", "in_training": "seen"}
 OF_OTHERS = {"data": "AMASS and others, on GPUs", "in_training": "unseen"}
 """Our references were made here, from videos that no training of theirs has seen; CMU's motions are
 a part of AMASS."""
-OF_DANCER = {"data": "125 motions of ours, on a GPU", "in_training": "unseen"}
+OF_DANCER = {"data": "125 motions, on a GPU", "in_training": "unseen"}
 ALIKE = ("g1_walk", "g1_authors_walk", "g1_authors_apt1")
 """Motions that the dancer has seen parts of, or ones like them (`split.yaml`, exceptions)."""
 Row = dict[str, Any]
@@ -122,9 +122,9 @@ def of_trackers(folders: Folders, move: str) -> Iterator[Row]:
     ):
         found = [r for r in table if (r["tracker"], r["move"], r["friction"]) == (name, move, 1.0)]
         if not found:
-            known_elsewhere = who == DANCER and POLICIES[move].is_foreign
+            in_notebook = who == DANCER and POLICIES[move].is_foreign
             how = f"{UNMEASURED} --trackers {name} --moves {move}"
-            yield row(who, move, why=OF_28_NOVEMBER if known_elsewhere else how)
+            yield row(who, move, why=OF_28_NOVEMBER if in_notebook else how)
             continue
         last, note = found[-1], ""
         taken = {figure: last.get(figure) for figure in (*FIGURES, "feet_excess_m_s", "cpu_s")}

@@ -15,7 +15,8 @@ from robojackson.robot.model import load_robot
 from storage.store import Store
 from tasks.runtime.start_networks import local_start_file
 
-WALKER = "walker"
+SHIPPED = ("walker", "dancer")
+"""Starts that not every robot has."""
 """Start whose networks depend on the robot."""
 
 
@@ -24,7 +25,7 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
 
     Raises:
         UnknownName, BadConfiguration: something that it names does not exist or cannot be used.
-        BadPolicy: a setup starts from a walker and the robot has none.
+        BadPolicy: a setup starts from a walker or the dancer and the robot has none.
         UnreadableVideo: the clip of a move is not there.
     """
     if overrides.get("steps") is not None:
@@ -43,11 +44,11 @@ def trainings_of(study: Study, robot: RobotDescription) -> dict[str, TrainConfig
 
     Raises:
         UnknownName, BadConfiguration: a setup does not exist, or the model of the robot is missing.
-        BadPolicy: a setup starts from a walker and the robot has none.
+        BadPolicy: a setup starts from a walker or the dancer and the robot has none.
     """
     found: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
     for config in found.values():
-        if config.start == WALKER:
+        if config.start in SHIPPED:
             local_start_file(Store.from_environment(), config, robot)
     return found
 

@@ -142,9 +142,9 @@ def _start(start: str) -> list[Ingredient]:
     """Return the weights that the training began with."""
     if start == "scratch":
         return []
-    if start == "walker":
-        note = "RoboJackson's walker (assets/PROVENANCE.md)"
-        return [Ingredient("weights", "start: walker", "Apache-2.0", note)]
+    if start in ("walker", "dancer"):
+        note = f"RoboJackson's {start} (assets/PROVENANCE.md)"
+        return [Ingredient("weights", f"start: {start}", "Apache-2.0", note)]
     return [Ingredient("weights", f"start: {Path(start).name}", UNKNOWN, "the training began so")]
 
 

@@ -47,6 +47,8 @@ SETUPS = {
 }
 """What a configuration is called that no file gave: by whether it starts from networks, and whether
 curiosity is paid."""
+OF_DANCER = "pretrained-dancer"
+"""The same, where it starts from the dancer."""
 OWN_REWARD = "own"
 """Name of a reward term that is given as a bare function."""
 
@@ -116,6 +118,7 @@ def train_policy(
 def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
     """Return the labels of the run's rows."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
+    usual = OF_DANCER if config.start == "dancer" else usual
     labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
     return labels | ({"run_id": require_run_id(run_id)} if run_id else {})
 

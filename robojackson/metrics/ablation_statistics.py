@@ -20,7 +20,8 @@ COMPARED = (
 )
 """Pairs of setups with one difference: two in pretraining, two in curiosity."""
 ON_MANY = ("pretrained-dancer", "scratch")
-"""A pair of studies whose pretraining was on many motions, of which the paper has none."""
+"""Pair of a study of a network of many motions, which the paper has not; they differ in the start,
+and in the width of the actor and its first exploration."""
 Verdict = Literal["holds", "not shown", "reversed", "not measured"]
 
 
@@ -63,8 +64,9 @@ def claims(
     walking: Mapping[str, bool],
     rng: np.random.Generator,
 ) -> list[Claim]:
-    """Return the paper's three claims, and the same two effects where the others are absent; with
-    a dancer, whether starting from it helps.
+    """Return the paper's three claims, and the same two effects where the others are absent.
+
+    Where a dancer was started from, whether that helps is one more.
 
     Args:
         figures: The figure of each seed, by (move, setup); higher is better.
@@ -91,8 +93,10 @@ def comparisons(
     moves: Sequence[str],
     rng: np.random.Generator,
 ) -> list[Comparison]:
-    """Return the four effects of the 2 x 2 on every move alone, where a mean over moves may hide
-    that one gains what another loses; with a dancer, its effect as well.
+    """Return the four effects of the 2 x 2 on every move alone.
+
+    A mean over moves may hide that one gains what another loses. Where a dancer was started from,
+    its effect is one more.
     """
     pairs = (*COMPARED, ON_MANY) if _has_dancer(figures) else COMPARED
     return [

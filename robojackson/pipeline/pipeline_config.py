@@ -34,7 +34,8 @@ class PipelineConfig:
             while the tracker falls from half of its starts; none keeps the motion's own, and so
             does a `retarget.tempo` that is not `auto`.
         tracker: Name of the tracker (`configs/trackers`) whose dance is on the page first; null is
-            the first for the robot whose file is here, `none` is no tracker.
+            the first for the robot whose file is here, of those that may be selected so
+            (`by_default` in their YAML), `none` is no tracker.
         gate: Refuse to train on a reference motion that breaks a hard bar of its score card.
         network: Published networks whose weights the user supplies; none by default.
         video, stability, mocap, retarget, train, evaluate, render: Configurations of the stages.

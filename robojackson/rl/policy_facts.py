@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TypeVar, get_args
 
@@ -26,6 +26,8 @@ OTHER_PATH = (
     "the policy was trained on top of feedback along another path than this machine has found: "
     "copy the folder feedback of the store in which it was trained, or train it here"
 )
+LAW = ("law", "feedback", "feedforward", "action_factor", "residual", "arm_residual")
+"""Numbers of a control law that say what an action does."""
 SAME_PATH_RAD = 0.02
 """Largest difference of a hinge at which a path is the same."""
 
@@ -94,6 +96,32 @@ def networks_sha256(policy: Policy) -> str:
     for array in (array for layer in policy.layers for array in layer):
         digest.update(f"{array.shape}".encode() + np.asarray(array, np.float32).tobytes())
     return digest.hexdigest()
+
+
+def require_same_law(
+    facts: Mapping[str, object], control: ControlConfig, robot: Robot, start: str
+) -> None:
+    """Refuse a policy as the start of a training in which its actions would mean something else.
+
+    Args:
+        facts: Facts of its file.
+        control: Control law of the training, with every number.
+        start: How the training names it.
+
+    Raises:
+        BadPolicy: another robot, or another control law.
+    """
+    if facts.get("robot") != robot.description.name:
+        raise BadPolicy(
+            f"start {start!r} was trained for robot {facts.get('robot')!r}, not for "
+            f"{robot.description.name!r}"
+        )
+    learnt, now = facts.get("control"), asdict(control)
+    law = learnt if isinstance(learnt, Mapping) else {}
+    apart = [name for name in LAW if law.get(name) not in (None, now[name])]
+    if apart:
+        given = " ".join(f"--set track.control.{name}={law[name]}" for name in apart)
+        raise BadPolicy(f"start {start!r} has another control law: {given}")
 
 
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:

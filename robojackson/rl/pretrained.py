@@ -31,6 +31,9 @@ from robojackson.robot.description import RobotDescription
 
 log = logging.getLogger(__name__)
 
+MIN_LAYERS = 2
+"""Layers of an actor: a hidden one and the mean of the actions."""
+
 HUB = re.compile(r"^[\w.-]+/[\w.-]+(?<!\.safetensors)(?<!\.zip)$")
 
 
@@ -59,7 +62,7 @@ def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> 
     if start == "walker":
         return shipped_walker(mode) if robot is None else walker_file(robot, mode)
     if start == "dancer":
-        return shipped_dancer(robot)
+        return shipped_dancer(robot, mode)
     path = Path(start)
     if path.is_file():
         return path
@@ -97,9 +100,11 @@ def from_policy(path: Path) -> Networks:
     """Return the actor of a policy file of ours, which has no critics.
 
     Raises:
-        BadPolicy: the file is damaged.
+        BadPolicy: the file is damaged, or its network has no hidden layer.
     """
     policy = load_policy(path)
+    if len(policy.layers) < MIN_LAYERS:
+        raise BadPolicy(f"{path}: a policy without a hidden layer, from which no training starts")
     names = [*(f"actor.{i}" for i in range(len(policy.layers) - 1)), "mean"]
     tensors: Tensors = {}
     for name, (weight, bias) in zip(names, policy.layers, strict=True):

@@ -25,6 +25,7 @@ from robojackson.rl.feedback.cached_feedback import feedback_of
 from robojackson.rl.feedback.sampled_regulator import ENOUGH
 from robojackson.rl.modes.track_mode import control_of, is_fed
 from robojackson.rl.policy import load_policy
+from robojackson.rl.policy_facts import require_same_law
 from robojackson.rl.pretrained import pretrained
 from robojackson.rl.sim.motors import feedback_path
 from robojackson.rl.tqc.network_arrays import (
@@ -77,17 +78,17 @@ def train_policy(
     core = TrackingCore(robot, reference, environment, *of_tqc, hooks.rewards)
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
-    if networks is not None:
-        networks = _of_whole_observation(networks, core)
     if networks is None:
         tqc = residual_learning(config, robot, reference, held)
     else:
-        tqc = _shaped(networks, core, config)
+        networks, tqc = _fitting(networks, core, config, robot)
     seen = core.actor_size if core.actor_size < core.observation_size else None
     trainer = make_trainer(config.trainer, env, tqc, config.seed, seen)
     if networks is not None:
         started = chosen(networks, config.start_critics)
-        trainer.start_from(with_exploration(started, tqc).tensors)
+        if not (tqc.gsde and config.trainer == "sb3"):  # whose noise has no such head
+            started = with_exploration(started, tqc.log_std_init)
+        trainer.start_from(started.tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
     try:
@@ -191,14 +192,11 @@ def polishes(
     return usual and chosen and fed and better
 
 
-def _of_whole_observation(networks: Networks, core: TrackingCore) -> Networks:
-    """Return an actor that has inputs for what the critics alone see, as the trainers keep it."""
-    is_policy = networks.observation_size == core.actor_size and not networks.has_critics
-    return widened(networks, core.observation_size) if is_policy else networks
-
-
-def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcConfig:
-    """Return TQC's configuration with the layers of the networks, whose inputs must fit."""
+def _fitting(
+    networks: Networks, core: TrackingCore, config: TrainConfig, robot: Robot
+) -> tuple[Networks, TqcConfig]:
+    """Return the networks, which must fit, and TQC's configuration with their layers; a policy's
+    actor gets inputs for what the critics alone see, as the trainers keep it."""
     learnt = networks.facts.get("environment")
     kind = learnt.get("observation", "full") if isinstance(learnt, Mapping) else None
     if config.mode == "track" and kind not in (None, config.track.observation):
@@ -206,8 +204,11 @@ def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcC
             f"start {config.start!r} observes {kind} and this training "
             f"{config.track.observation}, in another order: --set track.observation={kind}"
         )
+    if networks.is_policy:
+        require_same_law(networks.facts, core.sim.control, robot, config.start)
+    seen = core.actor_size if networks.is_policy else core.observation_size
     found = (networks.observation_size, networks.action_size)
-    needed = (core.observation_size, core.action_size)
+    needed = (seen, core.action_size)
     if found != needed:
         raise BadPolicy(
             f"start {config.start!r} takes {found[0]} observations and gives {found[1]} actions; "
@@ -216,4 +217,4 @@ def _shaped(networks: Networks, core: TrackingCore, config: TrainConfig) -> TqcC
     tqc = fitted(config.tqc, networks, config.start_critics)
     if tqc != config.tqc:
         log.info("layers as in %s: actor %s, critics %s", config.start, tqc.actor, tqc.critic)
-    return tqc
+    return widened(networks, core.observation_size) if networks.is_policy else networks, tqc

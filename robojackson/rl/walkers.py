@@ -37,20 +37,22 @@ def is_shipped(robot: RobotDescription, mode: str) -> bool:
     return facts.get("robot") == robot.name or facts.get("model_sha256") == _model(robot)
 
 
-def shipped_dancer(robot: RobotDescription | None) -> Path:
+def shipped_dancer(robot: RobotDescription | None, mode: str) -> Path:
     """Return the file of the dancer, which was trained on many motions of one robot.
 
     Raises:
         BadConfiguration: the model of the robot is not installed.
-        BadPolicy: it was trained on another robot.
+        BadPolicy: it was trained on another robot or model, or in another mode.
     """
-    path = ASSETS / DANCER
+    path, rest = ASSETS / DANCER, "take --setup scratch or pretrain"
     facts = load_policy(path).facts
-    if robot is None or facts.get("model_sha256") != _model(robot):
-        given = "another one" if robot is None else repr(robot.name)
-        raise BadPolicy(
-            f"start 'dancer' is for robot {facts.get('robot')!r}, not {given}: use scratch, walker"
-        )
+    if robot is None or robot.name != facts.get("robot"):
+        given = "the robot of this training" if robot is None else repr(robot.name)
+        raise BadPolicy(f"start 'dancer' is for robot {facts.get('robot')!r}, not {given}: {rest}")
+    if mode != facts.get("mode"):
+        raise BadPolicy(f"start 'dancer' is for mode {facts.get('mode')}, not {mode}: {rest}")
+    if facts.get("model_sha256") != _model(robot):
+        raise BadPolicy(f"start 'dancer' was trained on another model of {robot.name!r}: {rest}")
     return path
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flows.study.study_plan import study_of
 from robojackson.cli.learning.training_request import requested
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -56,6 +57,39 @@ def test_a_policy_that_sees_something_else_is_refused(
         train_policy(sway, robot, config, tmp_path / "run")
 
 
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        (
+            {"control": {"action_factor": 4.0}},
+            r"another .* law: --set track\.control\.action_factor=4",
+        ),
+        ({"robot": "g1"}, "was trained for robot 'g1', not for 'humanoid'"),
+    ],
+)
+def test_a_policy_whose_actions_mean_something_else_is_refused(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, facts: dict[str, object], message: str
+) -> None:
+    given = random_policy(robot, sway)
+    other = replace(given, facts={**given.facts, **facts}).save(tmp_path / "other.safetensors")
+    config = TrainConfig(steps=16, start=str(other), tqc=QUIET, track=TrackConfig("onboard"))
+    with pytest.raises(BadPolicy, match=message):
+        train_policy(sway, robot, config, tmp_path / "run")
+
+
+def test_a_policy_without_a_hidden_layer_and_a_cut_one_are_no_start(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    given = random_policy(robot, sway)
+    flat = replace(given, layers=given.layers[:1]).save(tmp_path / "flat.safetensors")
+    with pytest.raises(BadPolicy, match="without a hidden layer"):
+        pretrained(str(flat), "track")
+    cut = tmp_path / "cut.safetensors"
+    cut.write_bytes(given.to_bytes()[:3000])
+    with pytest.raises(BadPolicy, match="no networks or policy file of ours"):
+        pretrained(str(cut), "track")
+
+
 def test_the_dancer_is_small_and_what_its_tracker_pins() -> None:
     assert (ASSETS / DANCER).stat().st_size < LARGEST
     assert require_file(describe_tracker("dancer")) == ASSETS / DANCER
@@ -77,12 +111,21 @@ def test_the_setup_trains_the_dancer(tmp_path: Path) -> None:
     train_policy(swaying(robot), robot, config, tmp_path / "run")
     policy = load_policy(tmp_path / "run" / "policy.safetensors")
     assert policy.observation_size == Observer(robot, "preview").actor_size
-    np.testing.assert_allclose(
-        policy.layers[1][0], load_policy(ASSETS / DANCER).layers[1][0], atol=1e-6
-    )
+    for (weight, _), (weight_2, _) in zip(
+        policy.layers, load_policy(ASSETS / DANCER).layers, strict=True
+    ):
+        np.testing.assert_allclose(weight, weight_2, atol=1e-6)
 
 
 @G1
-def test_another_robot_cannot_start_from_it() -> None:
-    with pytest.raises(BadPolicy, match=r"start 'dancer' is for robot 'g1', not 'humanoid'"):
-        pretrained("dancer", "track", description())
+def test_another_robot_or_mode_cannot_start_from_it() -> None:
+    for name in ("humanoid", "g1_23"):
+        with pytest.raises(BadPolicy, match=rf"start 'dancer' is for robot 'g1', not '{name}'"):
+            pretrained("dancer", "track", description(name))
+    with pytest.raises(BadPolicy, match="mode track, not paper"):
+        pretrained("dancer", "paper", description("g1"))
+
+
+def test_a_study_of_another_robot_is_refused_before_it_begins(store_folder: Path) -> None:
+    with pytest.raises(BadPolicy, match="not 'humanoid': take --setup scratch or pretrain"):
+        study_of("dancer", {"robot": "humanoid"})

@@ -46,7 +46,7 @@ def live_data(
     """Return the data of a live dance; None where a browser cannot run it.
 
     A browser cannot run a policy of the paper's mode, a tracker whose network is a file of another
-    project, or a robot whose meshes collide.
+    project, feedback with a network of many motions on top, or a robot whose meshes collide.
     """
     if not runs_in_a_browser(policy):
         return None

@@ -35,14 +35,6 @@ def shown_control(policy: Evaluated, robot: Robot) -> ControlConfig:
     return control
 
 
-def _driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) -> Driver:
-    """Return who is compared; the law alone of the feedback, whose estimate is then without
-    noise."""
-    if isinstance(policy, RegulatorTracker):
-        return feedback_driver(shown_control(policy, robot))
-    return trained_driver(policy, robot, reference)
-
-
 def live_records(
     policy: Evaluated, reference: ReferenceMotion, robot: Robot
 ) -> list[dict[str, object]]:
@@ -74,3 +66,11 @@ def live_records(
         }
         for i in range(count)
     ]
+
+
+def _driver(policy: Evaluated, robot: Robot, reference: ReferenceMotion) -> Driver:
+    """Return the driver that is compared; of feedback alone its law, whose estimate has no noise
+    here."""
+    if isinstance(policy, RegulatorTracker):
+        return feedback_driver(shown_control(policy, robot))
+    return trained_driver(policy, robot, reference)

@@ -88,7 +88,8 @@ class TqcConfig:
         critic: Units of the critics' hidden layers.
         layer_norm: Layer normalisation between the critics' layers.
         gsde: State-dependent exploration; `sbx` has none and explores with plain noise.
-        log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE only.
+        log_std_init: Logarithm of the first exploration noise; `sb3` uses it with gSDE, or where
+            the training starts from a policy, alone.
         zero_init: Begin with actions of zero and noise of `log_std_init`, without random actions
             (residual policy learning, Silver et al., 2018).
         burn_in: Transitions before the first update of the actor; the critics learn alone.

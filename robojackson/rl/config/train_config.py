@@ -48,9 +48,9 @@ class TrainConfig:
         minutes: Wall time, minutes.
         cpu_minutes: Processor time, all threads together, minutes.
         start: Source of the networks: `scratch`, our `walker` of the mode, our `dancer` of the
-            Unitree G1 (an actor alone; `track.observation=preview`), a networks.safetensors, a
-            policy.safetensors (an actor alone), an SB3 zip, or a repository of the hub
-            (`owner/name`).
+            Unitree G1 (use the setup `pretrained-dancer`), a networks.safetensors, an SB3 zip, or a
+            repository of the hub (`owner/name`); or a policy.safetensors, an actor alone, which
+            explores with `tqc.log_std_init` and waits for its critics for `tqc.burn_in`.
         start_critics: Whether the critics come from the same source.
         polish: Whether the training starts from what the feedback alone does and improves it
             (preset `polish` of TQC). `auto`: from scratch, on a robot whose feedback follows a

@@ -55,6 +55,11 @@ class Networks:
         """Return whether both critics exist."""
         return all(f"{critic}.0.weight" in self.tensors for critic in CRITICS)
 
+    @property
+    def is_policy(self) -> bool:
+        """Return whether they are a policy file's: an actor without critics and noise."""
+        return not self.has_critics and "log_std.weight" not in self.tensors
+
     def widths(self, part: str) -> tuple[int, ...]:
         """Return the units of every layer of a part."""
         names = (f"{part}.{i}.weight" for i in count())
@@ -90,10 +95,11 @@ def load_networks(path: Path) -> Networks:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         facts = parse_json(header.get(FORMAT, "{}"))
     except (OSError, SafetensorError, TypeError, ValueError) as error:
-        raise BadPolicy(f"{path} is not a networks file of ours ({error})") from error
+        raise BadPolicy(f"{path} is no networks or policy file of ours ({error})") from error
     if FORMAT not in header:
         raise BadPolicy(
-            f"{path} is not a {FORMAT} file; `robojackson train` writes networks.safetensors"
+            f"{path} is not a {FORMAT} file; `robojackson train` writes networks.safetensors and "
+            "policy.safetensors"
         )
     return require_complete(Networks(tensors, facts), path)
 
@@ -187,15 +193,18 @@ def chosen(networks: Networks, critics: bool) -> Networks:
     return replace(networks, tensors=kept)
 
 
-def with_exploration(networks: Networks, config: TqcConfig) -> Networks:
-    """Return the networks with the exploration noise of a training (`log_std_init`), where an actor
-    has none of its own; gSDE has no such head."""
-    if "log_std.weight" in networks.tensors or config.gsde:
+def with_exploration(networks: Networks, log_std: float) -> Networks:
+    """Return the networks with a constant exploration noise, where the actor has none of its own.
+
+    Args:
+        log_std: Logarithm of its standard deviation, before tanh.
+    """
+    if "log_std.weight" in networks.tensors:
         return networks
     mean = networks.tensors["mean.weight"]
     head = {
         "log_std.weight": np.zeros_like(mean),
-        "log_std.bias": np.full(mean.shape[1], config.log_std_init, np.float32),
+        "log_std.bias": np.full(mean.shape[1], log_std, np.float32),
     }
     return replace(networks, tensors={**networks.tensors, **head})
 

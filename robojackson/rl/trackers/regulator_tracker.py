@@ -1,5 +1,5 @@
 """The linear-quadratic feedback along a reference as a tracker: it needs no network and no file.
-With a network on top of it, a policy that was trained on many motions, it is the dancer.
+It may have a network on top, a policy that was trained on many motions.
 
 A motion that the feedback along it does not hold is first simulated many times, for a path beside
 it that the physics follows (`docs/learning_g1.md`, "A sampled path"). It works on any robot whose

@@ -44,15 +44,15 @@ class TrackerDescription:
         root_state: Place and velocity of the root in the input of `regulator`: `exact`, as a
             simulation knows them, or `estimated` from the robot's own measurements
             (`rl.sim.leg_odometry`).
-        fallback: Whether to select it by default only if no other tracker of its robot is
-            installed.
+        fallback: Whether to select it by default only if no other tracker of its robot that may
+            be selected so is installed.
+        by_default: Whether it may be selected where no tracker is named.
         homepage: Address of its authors' description.
         licence: Licence of the file.
         trained_on: Training motions by its authors.
         control_dt: Seconds a control step.
         timestep: Seconds a physics step, where the PD law with these gains is not stable at the
             robot's own; the robot's when null.
-        by_default: Whether to select it at all where no tracker is named.
         action_scale: Radians that an action of 1 moves a hinge's target from the default pose.
         action_limit: Largest magnitude of an action, unitless.
         joints: Hinges in the order of observation and action.

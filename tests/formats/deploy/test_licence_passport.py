@@ -102,7 +102,11 @@ def ingredients(pack: Pack, folder: Path, **facts: object) -> dict[str, str]:
 
 @pytest.mark.parametrize(
     ("start", "name", "licence"),
-    [("walker", "start: walker", "Apache-2.0"), ("them/theirs", "start: theirs", "unknown")],
+    [
+        ("walker", "start: walker", "Apache-2.0"),
+        ("dancer", "start: dancer", "Apache-2.0"),
+        ("them/theirs", "start: theirs", "unknown"),
+    ],
 )
 def test_the_weights_that_a_training_began_with_are_listed(
     pack: Pack, tmp_path: Path, start: str, name: str, licence: str
