@@ -19,9 +19,10 @@ from benchmarks.learning.tracker_rows import present
 from robojackson.api.performances import perform
 from robojackson.files.json_types import to_json_types
 from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
-from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
+from robojackson.pipeline.tracker_descriptions import default_trackers
 from robojackson.rl.config.performance_config import PerformanceConfig
 
+ROBOT = "g1"
 DANCES = ("g1_hip_shake", "g1_dance_b", "g1_walk")
 BAR = 0.95
 """Share of runs that end standing."""
@@ -33,7 +34,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--trackers", nargs="*", default=usual_trackers())
+    parser.add_argument("--trackers", nargs="*", default=[t.name for t in default_trackers(ROBOT)])
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--pushes", type=float, nargs="*", default=[1.0])
     parser.add_argument("--folder", type=Path, help="for everything, instead of the usual places")
@@ -50,11 +51,6 @@ def main() -> None:
         cells = [row[key] for key in SHOWN]
         table.add_row(*(f"{c:.3g}" if isinstance(c, float) else str(c) for c in cells))
     Console(width=160).print(table)
-
-
-def usual_trackers() -> list[str]:
-    """Return the trackers that a performance may select by itself."""
-    return [name for name in tracker_names() if describe_tracker(name).by_default]
 
 
 def measured(

@@ -10,14 +10,11 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.walkers import STARTS
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
 from storage.store import Store
 from tasks.runtime.start_networks import local_start_file
-
-SHIPPED = ("walker", "dancer")
-"""Starts that not every robot has."""
-"""Start whose networks depend on the robot."""
 
 
 def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
@@ -48,7 +45,7 @@ def trainings_of(study: Study, robot: RobotDescription) -> dict[str, TrainConfig
     """
     found: dict[str, TrainConfig] = {s: training(study, s) for s in study.setups}
     for config in found.values():
-        if config.start in SHIPPED:
+        if config.start in STARTS:
             local_start_file(Store.from_environment(), config, robot)
     return found
 

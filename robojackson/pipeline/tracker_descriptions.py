@@ -42,6 +42,11 @@ def trackers_of(robot: str) -> list[TrackerDescription]:
     return [each for each in map(describe_tracker, tracker_names()) if each.robot == robot]
 
 
+def default_trackers(robot: str) -> list[TrackerDescription]:
+    """Return the trackers of a robot that may be selected where none is named."""
+    return [each for each in trackers_of(robot) if each.by_default]
+
+
 def require_tracker(robot: str, name: str | None = None) -> TrackerDescription | None:
     """Return a tracker of a robot that can be run at once.
 
@@ -57,8 +62,7 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     """
     if name == NONE:
         return None
-    usual = [each for each in trackers_of(robot) if each.by_default]
-    known = usual if name is None else [describe_tracker(name)]
+    known = default_trackers(robot) if name is None else [describe_tracker(name)]
     if not known:
         every = [f"{each.name} ({each.robot})" for each in map(describe_tracker, tracker_names())]
         raise BadPolicy(

@@ -17,6 +17,7 @@ from robojackson.rl.modes.observation import Kind, Observer
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.sim.motors import Motors, actuation_facts
 from robojackson.rl.sim.stock_humanoid import stock_observation_size
+from robojackson.rl.tqc.network_arrays import Networks
 from robojackson.robot.model import Robot
 
 T = TypeVar("T")
@@ -44,8 +45,8 @@ def mode_of(policy: Policy) -> str:
     return mode
 
 
-def recorded_law(policy: Policy) -> Mapping[str, object]:
-    """Return the control law as a policy's file has it, unchecked; empty where it has none."""
+def recorded_law(policy: Policy | Networks) -> Mapping[str, object]:
+    """Return the control law as a file has it, unchecked; empty where it has none."""
     held = policy.facts.get("control")
     return held if isinstance(held, Mapping) else {}
 
@@ -98,26 +99,24 @@ def networks_sha256(policy: Policy) -> str:
     return digest.hexdigest()
 
 
-def require_same_law(
-    facts: Mapping[str, object], control: ControlConfig, robot: Robot, start: str
-) -> None:
+def require_same_law(networks: Networks, control: ControlConfig, robot: Robot, start: str) -> None:
     """Refuse a policy as the start of a training in which its actions would mean something else.
 
     Args:
-        facts: Facts of its file.
+        networks: The policy's actor.
         control: Control law of the training, with every number.
         start: How the training names it.
 
     Raises:
         BadPolicy: another robot, or another control law.
     """
-    if facts.get("robot") != robot.description.name:
+    trained_for = networks.facts.get("robot")
+    if trained_for != robot.description.name:
         raise BadPolicy(
-            f"start {start!r} was trained for robot {facts.get('robot')!r}, not for "
+            f"start {start!r} was trained for robot {trained_for!r}, not for "
             f"{robot.description.name!r}"
         )
-    learnt, now = facts.get("control"), asdict(control)
-    law = learnt if isinstance(learnt, Mapping) else {}
+    law, now = recorded_law(networks), asdict(control)
     apart = [name for name in LAW if law.get(name) not in (None, now[name])]
     if apart:
         given = " ".join(f"--set track.control.{name}={law[name]}" for name in apart)

@@ -205,7 +205,7 @@ def _fitting(
             f"{config.track.observation}, in another order: --set track.observation={kind}"
         )
     if networks.is_policy:
-        require_same_law(networks.facts, core.sim.control, robot, config.start)
+        require_same_law(networks, core.sim.control, robot, config.start)
     seen = core.actor_size if networks.is_policy else core.observation_size
     found = (networks.observation_size, networks.action_size)
     needed = (seen, core.action_size)

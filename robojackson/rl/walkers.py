@@ -17,6 +17,8 @@ from robojackson.robot.mjcf import mjcf_path, model_sha256, robots_folder
 ASSETS = Path(__file__).parent.parent / "assets"
 WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetensors"}
 DANCER = "dancer_g1.safetensors"
+STARTS = ("walker", "dancer")
+"""Words that a training's `start` has for shipped networks, of which not every robot has one."""
 FOLDER = "pretrain"
 DIGITS = 12
 """Number of digits of the model's digest in the name of a walker's folder."""

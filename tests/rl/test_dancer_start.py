@@ -95,9 +95,7 @@ def test_the_dancer_is_small_and_what_its_tracker_pins() -> None:
     assert require_file(describe_tracker("dancer")) == ASSETS / DANCER
 
 
-def test_no_dance_uses_it_unless_it_is_named(
-    store_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_dance_uses_it_unless_it_is_named(store_folder: Path) -> None:
     chosen = require_tracker("g1")
     assert chosen is not None
     assert chosen.name == "regulator"
