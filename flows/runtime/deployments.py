@@ -23,7 +23,7 @@ from flows.runtime.environment import HEARTBEAT, HEARTBEAT_S
 from flows.runtime.prefect_server import answering, await_server
 from robojackson.errors import DeploymentFailed
 from robojackson.pipeline.app_folder import app_folder
-from robojackson.pipeline.yaml_loader import find
+from robojackson.pipeline.configuration_files import find
 from storage.store import Store
 
 POOLS = {

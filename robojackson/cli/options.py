@@ -17,7 +17,7 @@ def _named(folder: str = "") -> Callable[[str], list[str]]:
     paths."""
 
     def complete(incomplete: str) -> list[str]:
-        from robojackson.pipeline.yaml_loader import names
+        from robojackson.pipeline.configuration_files import names
 
         return [name for name in names(folder) if name.startswith(incomplete)]
 

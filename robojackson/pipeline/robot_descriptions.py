@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.pipeline.yaml_loader import SUFFIXES, find, load, names
+from robojackson.pipeline.configuration_files import SUFFIXES, find, names
+from robojackson.pipeline.yaml_loader import load
 from robojackson.robot.description import RobotDescription
 
 FOLDER = "robots"

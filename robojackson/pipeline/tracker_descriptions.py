@@ -1,7 +1,8 @@
 """The trackers of `configs/trackers`, by name."""
 
 from robojackson.errors import BadConfiguration, BadPolicy
-from robojackson.pipeline.yaml_loader import load, names
+from robojackson.pipeline.configuration_files import names
+from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.trackers.onnx_network import require_runtime
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.tracker_file import is_present, require_file

@@ -1,14 +1,10 @@
 """YAML to frozen dataclasses: unknown keys are refused with the file and the path of the key.
 
-A name such as `smoke` or `robots/humanoid` is a file of the user's `./configs` (or of the folder
-that ROBOJACKSON_CONFIGS names), else of the shipped ones; a name with a YAML suffix is a path.
 A file with `extends: robots/g1` begins with the keys of that one; a key of its own replaces the
 whole of the other's. YAML is read as version 1.2 does it (`yaml_scalars`).
 """
 
 import difflib
-import os
-import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -19,12 +15,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from robojackson.errors import BadConfiguration, ConflictingValues, UnknownName
 from robojackson.files.foreign_file import read_text
-from robojackson.pipeline.app_folder import CONFIGS, app_folder
+from robojackson.pipeline.configuration_files import (
+    SUFFIXES,
+    TOP_KINDS,
+    display_name,
+    find,
+    names,
+)
 from robojackson.pipeline.yaml_scalars import Yaml12, mistake, require_few
 
 Config = TypeVar("Config")
-SHIPPED = app_folder() / "configs"
-SUFFIXES = (".yaml", ".yml")
 EXTENDS = "extends"
 UNEXPECTED = ("unexpected_keyword_argument", "extra_forbidden")
 """Kinds of Pydantic's errors about a key that there is not."""
@@ -47,12 +47,12 @@ def load(
         UnknownName: no such file.
         BadConfiguration: an unknown key, a wrong value, or no YAML.
     """
-    path = None if name_or_path is None else find(name_or_path)
+    path = None if name_or_path is None else _found(cls, name_or_path)
     values, places = _read_extended(path) if path else ({}, {})
     given = parsed_overrides(overrides or {})
     for key_path, value in given.items():
         _set(values, key_path.split("."), value)
-    where = _display_name(path) if path else "--set"
+    where = display_name(path) if path else "--set"
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as cause:
@@ -64,6 +64,24 @@ def load(
             named = [g for g in blamed if g.startswith(in_question)]
             where = f"--set {', '.join(named or blamed)}"
         raise refusal(cls, cause, where) from cause
+
+
+def _found(cls: type[Config], name_or_path: str | Path) -> Path:
+    """Return the file of a configuration; an unknown name's error lists those of its class."""
+    try:
+        return find(name_or_path)
+    except UnknownName as unknown:
+        if unknown.kind not in TOP_KINDS:
+            raise
+        fitting = [name for name in names() if _fits(cls, name)]
+        raise UnknownName(unknown.kind, unknown.name, unknown.where, fitting) from None
+
+
+def _fits(cls: type[Config], name: str) -> bool:
+    try:
+        return load(cls, name) is not None
+    except BadConfiguration:
+        return False
 
 
 def parsed_overrides(overrides: Mapping[str, object]) -> dict[str, object]:
@@ -87,52 +105,12 @@ def build(cls: type[Config], values: Mapping[str, object], where: str) -> Config
         raise refusal(cls, cause, where) from cause
 
 
-def find(name_or_path: str | Path) -> Path:
-    """Return the file of a configuration.
-
-    Raises:
-        UnknownName: there is no such file; the message lists those that exist.
-    """
-    given = Path(name_or_path)
-    if given.suffix in SUFFIXES:
-        if given.is_file():
-            return given
-        raise UnknownName("configuration file", str(given), "as a path", names())
-    for base in folders():
-        path = base / f"{given}.yaml"
-        if path.is_file() and path.resolve().is_relative_to(base.resolve()):
-            return path
-    parent, slash, name = str(name_or_path).rpartition("/")  # Path drops an empty name
-    folder = Path(parent).name
-    kind = re.sub("ies$", "y", folder).removesuffix("s") or "configuration"
-    raise UnknownName(kind, name, f"configs/{parent}{slash}{name}.yaml", names(folder))
-
-
-def folders() -> list[Path]:
-    """Return where named configurations are looked for: the user's folder first, then the shipped
-    one."""
-    own = Path(os.environ.get(CONFIGS) or "configs").absolute()
-    return [own, SHIPPED] if own != SHIPPED and own.is_dir() else [SHIPPED]
-
-
-def names(folder: str = "") -> tuple[str, ...]:
-    """Return the names of all configurations, or of those of one kind, such as `robots`."""
-    found = {path.stem for base in folders() for path in (base / folder).glob("*.yaml")}
-    return tuple(sorted(found))
-
-
-def _display_name(path: Path) -> str:
-    """Return the name of the file for messages."""
-    inside = path.is_relative_to(SHIPPED)
-    return f"configs/{path.relative_to(SHIPPED).as_posix()}" if inside else str(path)
-
-
 def _read_extended(
     path: Path, below: tuple[Path, ...] = ()
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Return the values of a file over those of the one that it extends, and the file of each
     key."""
-    values, place = _read(path), _display_name(path)
+    values, place = _read(path), display_name(path)
     base, places = values.pop(EXTENDS, None), dict.fromkeys(values, place)
     if base is None:
         return values, places
@@ -151,13 +129,13 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         text = read_text(path, BadConfiguration, LARGEST)
     except BadConfiguration as cause:
-        raise BadConfiguration(cause.reason, _display_name(path)) from cause
-    values = _parsed(text, _display_name(path))
+        raise BadConfiguration(cause.reason, display_name(path)) from cause
+    values = _parsed(text, display_name(path))
     if values is None:
         return {}
     if not isinstance(values, dict):
         raise BadConfiguration(
-            f"{_display_name(path)}: holds {type(values).__name__}, expected keys and values"
+            f"{display_name(path)}: holds {type(values).__name__}, expected keys and values"
         )
     return values
 

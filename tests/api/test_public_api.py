@@ -162,7 +162,7 @@ def test_a_robot_is_saved_as_a_model_that_mujoco_loads(tmp_path: Path) -> None:
 
 
 def test_a_robot_comes_from_a_file_of_ones_own(tmp_path: Path) -> None:
-    from robojackson.pipeline.yaml_loader import SHIPPED
+    from robojackson.pipeline.configuration_files import SHIPPED
 
     text = (SHIPPED / "robots" / "humanoid.yaml").read_text()
     (tmp_path / "mine.yaml").write_text(text.replace("name: humanoid", "name: mine"))

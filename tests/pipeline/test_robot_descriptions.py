@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.pipeline import yaml_loader
+from robojackson.pipeline import configuration_files
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from tests.fixtures.own_robot import own_robot
 
@@ -57,10 +57,10 @@ def test_a_copy_with_the_name_of_the_original_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its motions would be taken for those of the other robot."""
-    original = yaml_loader.SHIPPED / "robots" / "humanoid.yaml"
+    original = configuration_files.SHIPPED / "robots" / "humanoid.yaml"
     (tmp_path / "robots").mkdir()
     (tmp_path / "robots" / "strong.yaml").write_text(original.read_text())
-    monkeypatch.setattr(yaml_loader, "SHIPPED", tmp_path)
+    monkeypatch.setattr(configuration_files, "SHIPPED", tmp_path)
     with pytest.raises(BadConfiguration, match=r"strong\.yaml: name is 'humanoid'"):
         describe_robot("strong")
 

@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
+from configs.find_config import FindConfig
 from robojackson.config import config_dataclass
 from robojackson.errors import BadConfiguration, UnknownName
-from robojackson.pipeline import yaml_loader
+from robojackson.pipeline import configuration_files, yaml_loader
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.rl.config.train_config import TrainConfig
 
@@ -158,7 +159,7 @@ def test_an_override_with_an_unknown_key_is_refused(write) -> None:
 
 def test_an_empty_name_is_one_of_its_folder() -> None:
     with pytest.raises(UnknownName, match=r"unknown robot '' .*Known: .*humanoid"):
-        yaml_loader.find("robots/")
+        configuration_files.find("robots/")
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
@@ -166,20 +167,31 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
         yaml_loader.load(Outer, "robots/c3po")
 
 
+@pytest.mark.parametrize(
+    ("config", "listed"), [(FindConfig, "finding"), (PipelineConfig, "base, polish, smoke")]
+)
+@pytest.mark.parametrize("name", ["nosuch", "nosuch.yaml"])
+def test_an_unknown_name_lists_the_configurations_of_its_class(
+    config: type, listed: str, name: str
+) -> None:
+    with pytest.raises(UnknownName, match=f"Known: {listed}$"):
+        yaml_loader.load(config, name)
+
+
 @pytest.mark.parametrize(("folder", "kind"), [("studies", "study"), ("moves", "move")])
 def test_what_is_unknown_is_called_what_it_is(folder: str, kind: str) -> None:
     with pytest.raises(UnknownName, match=f"unknown {kind} 'nosuch'"):
-        yaml_loader.find(f"{folder}/nosuch")
+        configuration_files.find(f"{folder}/nosuch")
 
 
 def test_a_name_does_not_lead_out_of_the_package() -> None:
     with pytest.raises(UnknownName):
-        yaml_loader.find("../tests/configs/given")
+        configuration_files.find("../tests/configs/given")
 
 
 def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     monkeypatch.chdir(tmp_path)
-    assert yaml_loader.find("robots/humanoid").is_file()
+    assert configuration_files.find("robots/humanoid").is_file()
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ from stable_baselines3.common.env_checker import check_env as check_sb3
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.geometry.rotations import heading, quat_angle
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.configuration_files import names
 from robojackson.pipeline.robot_descriptions import describe_robot
-from robojackson.pipeline.yaml_loader import load, names
+from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv
