@@ -16,7 +16,7 @@ from robojackson.formats.deploy.licence_passport import (
 )
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.rl.policy import Policy
-from robojackson.rl.walkers import STARTS
+from robojackson.rl.walkers import SCRATCH, STARTS, start_name
 from robojackson.robot.model import Robot
 
 LANDMARKS, PERSON, SOURCE = "landmarks.parquet", "smpl.parquet", "source.json"
@@ -141,12 +141,12 @@ def _body_models(reference: Path) -> list[Ingredient]:
 
 def _start(start: str) -> list[Ingredient]:
     """Return the weights that the training began with."""
-    if start == "scratch":
+    if start == SCRATCH:
         return []
     if start in STARTS:
         note = f"RoboJackson's {start} (assets/PROVENANCE.md)"
         return [Ingredient("weights", f"start: {start}", "Apache-2.0", note)]
-    return [Ingredient("weights", f"start: {Path(start).name}", UNKNOWN, "the training began so")]
+    return [Ingredient("weights", f"start: {start_name(start)}", UNKNOWN, "the training began so")]
 
 
 def _sha256(path: Path) -> str:

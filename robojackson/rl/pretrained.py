@@ -26,7 +26,7 @@ from robojackson.rl.tqc.network_arrays import (
     load_networks,
     require_complete,
 )
-from robojackson.rl.walkers import shipped_dancer, shipped_walker, walker_file
+from robojackson.rl.walkers import SCRATCH, shipped_dancer, shipped_walker, walker_file
 from robojackson.robot.description import RobotDescription
 
 log = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ def pretrained(start: str, mode: str, robot: RobotDescription | None = None) -> 
 
 def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> Path | None:
     """Return the file of a start, downloaded if it is on the hub; None for `scratch`."""
-    if start == "scratch":
+    if start == SCRATCH:
         return None
     if start == "walker":
         return shipped_walker(mode) if robot is None else walker_file(robot, mode)

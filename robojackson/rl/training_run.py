@@ -16,7 +16,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import TrainingDiverged
-from robojackson.rl import checkpoint_folder
+from robojackson.rl import checkpoint_folder, walkers
 from robojackson.rl.checkpoint_folder import newest_checkpoint, set_results_aside, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
@@ -204,7 +204,7 @@ class Run:
             "trainer": config.trainer,
             "seed": config.seed,
             "setup": self._hooks.setup,
-            "start": Path(config.start).name,
+            "start": walkers.start_name(config.start),
             "curiosity": config.curiosity,
             "steps": self.trainer.steps(),
             "updates": self.trainer.updates(),

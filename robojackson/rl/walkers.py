@@ -19,9 +19,17 @@ WALKERS = {"track": "walker_track.safetensors", "paper": "walker_paper.safetenso
 DANCER = "dancer_g1.safetensors"
 STARTS = ("walker", "dancer")
 """Words that a training's `start` has for shipped networks, of which not every robot has one."""
+SCRATCH = "scratch"
 FOLDER = "pretrain"
 DIGITS = 12
 """Number of digits of the model's digest in the name of a walker's folder."""
+
+
+def start_name(start: str) -> str:
+    """Return how a training records its start: without folders, but for a file that would then read
+    as a shipped network."""
+    name = Path(start).name
+    return start if name in (SCRATCH, *STARTS) else name
 
 
 def shipped_walker(mode: str) -> Path:

@@ -122,7 +122,8 @@ class TrainConfig:
         given = (self.tqc.zero_init, self.tqc.burn_in, self.tqc.action_penalty)
         if self.trainer == "sb3" and any(given):
             raise ConflictingValues(
-                "tqc.zero_init, burn_in and action_penalty (preset polish) need trainer sbx",
+                "tqc.zero_init, burn_in and action_penalty (of preset polish or setup "
+                "pretrained-dancer) need trainer sbx",
                 "trainer",
                 "tqc",
             )

@@ -106,6 +106,7 @@ def ingredients(pack: Pack, folder: Path, **facts: object) -> dict[str, str]:
         ("walker", "start: walker", "Apache-2.0"),
         ("dancer", "start: dancer", "Apache-2.0"),
         ("them/theirs", "start: theirs", "unknown"),
+        ("them/dancer", "start: them/dancer", "unknown"),
     ],
 )
 def test_the_weights_that_a_training_began_with_are_listed(
