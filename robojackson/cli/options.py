@@ -119,7 +119,10 @@ Trainer = Annotated[
     Literal["sbx", "sb3"] | None, typer.Option(help="sbx (JAX, fast) or sb3 (the reference).")
 ]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the training.")]
-Minutes = Annotated[float | None, typer.Option(min=0.01, help="Wall time, minutes.")]
+Minutes = Annotated[
+    float | None,
+    typer.Option(min=0.01, help="Wall time of the whole pass, minutes; 12 by default."),
+]
 TrainMinutes = Annotated[
     float | None,
     typer.Option(min=0.01, help="Wall time, minutes; 9 where neither it nor --steps is given."),
