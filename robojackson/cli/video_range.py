@@ -45,11 +45,13 @@ def video_range(
     with results_in(out):
         out.mkdir(parents=True, exist_ok=True)
     target = out / f"{video.stem}-{begin:g}-{end:g}s.mp4"
+    made = not target.exists()
     try:
         in_video_process(trim, video, begin, end, target, frames=whole.frames)
         yield target
     except BaseException:
-        target.unlink(missing_ok=True)
+        if made:  # not that of an earlier run, whose results are about it
+            target.unlink(missing_ok=True)
         if not was_there and not any(out.iterdir()):
             out.rmdir()
         raise

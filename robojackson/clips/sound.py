@@ -34,17 +34,19 @@ class Sound:
         return f"Sound({len(self.samples) / RATE:.1f} s)"
 
 
-def read_sound(path: Path) -> Sound | None:
+def read_sound(path: Path, start_s: float = 0.0) -> Sound | None:
     """Read the first sound track of a video or of a sound file; None where it has none.
 
     What follows damage is left out, and so is a sound that begins after `LONGEST_S`
     or has less than `LOWEST_RATE` samples a second.
 
+    Args:
+        start_s: Time of the sound's first sample, seconds since the first picture.
     Raises:
         UnreadableVideo: the file cannot be read.
         TruncatedVideo: it ends before its index.
     """
-    parts, heard_s = list[np.ndarray](), 0.0
+    parts, heard_s, passed = list[np.ndarray](), 0.0, 0
     with opened(path, sounds=True) as container:
         if not container.streams.audio:
             return None
@@ -54,19 +56,24 @@ def read_sound(path: Path) -> Sound | None:
             shift -= _start_s(pictures[0])
         if shift > LONGEST_S or container.streams.audio[0].rate < LOWEST_RATE:  # fills the memory
             return None
+        first = round((start_s - shift) * RATE)
         resampler = av.AudioResampler(format="fltp", layout="stereo", rate=RATE)
         try:
             for frame in container.decode(audio=0):
-                parts += [part.to_ndarray().T for part in resampler.resample(frame)]
+                for part in resampler.resample(frame):
+                    if not parts and passed + part.samples <= first:
+                        passed += part.samples
+                    else:
+                        parts.append(part.to_ndarray().T)
                 heard_s += frame.samples / max(frame.sample_rate, 1)
-                if heard_s > LONGEST_S:
+                if heard_s > start_s + LONGEST_S:
                     break
             parts += [part.to_ndarray().T for part in resampler.resample(None)]
         except (av.FFmpegError, ValueError):
             pass  # damaged, or the rate changes: heard as far as it goes
     samples = np.concatenate([np.zeros((0, 2), np.float32), *parts])
     del parts
-    late = round(shift * RATE)
+    late = passed - first
     samples = np.pad(samples, ((late, 0), (0, 0))) if late > 0 else samples[-late:]
     np.clip(np.nan_to_num(samples, copy=False), -1, 1, out=samples)
     return Sound(samples) if np.abs(samples).max(initial=0.0) > SILENT else None

@@ -29,16 +29,16 @@ def trim(path: Path, start_s: float, end_s: float, out: Path) -> Path:
     Raises:
         TrackTooShort: the range holds no frame.
     """
-    info, sound = probe(path, ANY), read_sound(path)
+    info, sound = probe(path, ANY), read_sound(path, start_s)
     written = out.with_name(f"{TEMPORARY}{secrets.token_hex(8)}.mp4")
     try:
         frames = timed_frames(path, start_s, end_s)
         rate = Fraction(info.fps).limit_denominator(1001)
-        times = _encode(frames, rate, info.uneven, written, sound)
+        times = _encode(frames, rate, info.uneven, written, sound, start_s)
         if not times:
             raise TrackTooShort(f"no frame between {start_s:g} s and {end_s:g} s", path)
         if not info.uneven and uneven(np.array(times), info.fps):  # damaged frames are left out
-            _encode(timed_frames(path, start_s, end_s), rate, True, written, sound)
+            _encode(timed_frames(path, start_s, end_s), rate, True, written, sound, start_s)
         written.replace(out)
     finally:
         written.unlink(missing_ok=True)
@@ -51,9 +51,11 @@ def _encode(
     timed: bool,
     out: Path,
     sound: Sound | None,
+    sound_start_s: float,
 ) -> list[float]:
-    """Write images as H.264, at their times or at an even rate; returns their times since the first
-    of them, seconds."""
+    """Write images as H.264, at their times or at an even rate, with a sound that begins at
+    `sound_start_s` and is silent after its end; returns their times since the first of them,
+    seconds."""
     times: list[float] = []
     start_s = 0.0
     with av.open(f"file:{out.absolute()}", "w", format="mp4") as container:
@@ -78,6 +80,9 @@ def _encode(
         if times:
             container.mux(stream.encode(None))
         if times and sound and heard:
-            first, last = round(start_s * RATE), round((start_s + times[-1] + 1 / rate) * RATE)
-            encode_sound(container, heard, Sound(sound.samples[first:last]))
+            first = round((start_s - sound_start_s) * RATE)
+            samples = np.zeros((round((times[-1] + 1 / rate) * RATE), 2), np.float32)
+            there = sound.samples[first : first + len(samples)]
+            samples[: len(there)] = there
+            encode_sound(container, heard, Sound(samples))
     return times

@@ -1,4 +1,4 @@
-"""Pixels of a decoded frame: RGB, upright, and no larger than needed."""
+"""Pixels of a decoded frame: RGB, square, upright, and no larger than needed."""
 
 import cv2
 import numpy as np
@@ -15,18 +15,24 @@ NEARLY = 1.1
 """Making an image smaller costs more than a tenth of its pixels."""
 
 
-def upright(frame: VideoFrame, short_side: int | None) -> UInt8[np.ndarray, "H W 3"]:
-    """Return the pixels of a frame, its rotation tag applied.
+def upright(
+    frame: VideoFrame, short_side: int | None, aspect: float = 1.0
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Return the pixels of a frame, made square, its rotation tag applied.
 
     Args:
         frame: A decoded frame.
+        aspect: Width of a stored pixel over its height (`pixel_aspect`).
         short_side: Images that are larger by more than a tenth are made smaller until their short
             side has so many pixels.
     """
-    shortest = min(frame.width, frame.height)
+    wide = frame.width * aspect
+    shortest = min(wide, frame.height)
+    factor = 1.0
     if short_side is not None and shortest > NEARLY * short_side:
         factor = short_side / shortest
-        width, height = round(frame.width * factor), round(frame.height * factor)
+    if (factor, aspect) != (1.0, 1.0):
+        width, height = round(wide * factor), round(frame.height * factor)
         image = _pixels(frame.reformat(width, height, format="rgb24", interpolation="AREA"))
     else:
         image = _pixels(frame.reformat(format="rgb24"))

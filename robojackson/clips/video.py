@@ -22,6 +22,7 @@ from robojackson.clips.video_container import (
     first_frame,
     opened,
     packet_times,
+    pixel_aspect,
     rate,
     video_stream,
 )
@@ -63,7 +64,7 @@ class VideoInfo:
 
     Attributes:
         path: The file.
-        width, height: Size of the upright image, pixels.
+        width, height: Size of the upright image, square pixels.
         fps: Mean frames a second.
         uneven: Whether the frames are not evenly spaced, as a phone writes them.
         frames: Number of frames in the file.
@@ -122,7 +123,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     """
     with opened(path) as container:
         stream = video_stream(container, path)
-        declared = declared_rate(stream)
+        declared, aspect = declared_rate(stream), pixel_aspect(stream)
         promised = stream.frames
     stamps = packet_times(path)
     _require_complete(path, len(stamps), promised)
@@ -140,7 +141,8 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     if fps > FASTEST:
         raise UnreadableVideo(f"{fps:.0f} frames a second; at most {FASTEST:g} are read", path)
     rotation = -first.rotation % 360
-    size = (first.height, first.width) if rotation % 180 else (first.width, first.height)
+    size = (round(first.width * aspect), first.height)
+    size = size[::-1] if rotation % 180 else size
     frames = len(stamps)
     info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps))
     require_within(info, limits)
@@ -173,20 +175,20 @@ def timed_frames(
             side has this number of pixels.
     """
     origin = None
-    for stamp, frame in _decoded(path):
+    for stamp, frame, aspect in _decoded(path):
         origin = stamp if origin is None else origin
         time_s = stamp - origin
         if end_s is not None and time_s >= end_s - TIME_TOLERANCE_S:
             return
         if start_s is None or time_s >= start_s - TIME_TOLERANCE_S:
-            yield time_s, upright(frame, short_side)
+            yield time_s, upright(frame, short_side, aspect)
 
 
-def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
-    """Yield frames and their timestamps."""
+def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
+    """Yield timestamps, frames and the aspect of their pixels."""
     with opened(path) as container:
         stream = video_stream(container, path)
-        stream.thread_type = "NONE"
+        stream.thread_type, aspect = "NONE", pixel_aspect(stream)
         declared = declared_rate(stream) or 1.0  # where frames have no times
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
@@ -204,7 +206,7 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame]]:
             for frame in frames:
                 good += 1
                 time_s = good / declared if frame.time is None else float(frame.time)
-                yield time_s, frame
+                yield time_s, frame, aspect
 
 
 def _require_complete(path: Path, frames: int, promised: int) -> None:

@@ -34,6 +34,8 @@ LISTS = {
 }
 """Beginnings of what is no video and names other files."""
 MOST_PIXELS = 8192 * 8192
+ASPECTS = 0.25, 4.0
+"""Aspects of pixels that are believed."""
 MOST_FRAMES = 500_000
 """More than an hour at 120 frames a second."""
 FASTEST = 1000.0
@@ -96,6 +98,13 @@ def video_stream(container: av.container.InputContainer, path: Path) -> VideoStr
         )
     stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
     return stream
+
+
+def pixel_aspect(stream: VideoStream) -> float:
+    """Return the width of a stored pixel over its height: 1 of nearly all videos, not of anamorphic
+    ones (DV, HDV, DVD); 1 where it is not declared or not between `ASPECTS`."""
+    declared = float(stream.sample_aspect_ratio or 1)
+    return declared if ASPECTS[0] <= declared <= ASPECTS[1] else 1.0
 
 
 def first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:

@@ -28,7 +28,10 @@ KNOWN_TO_FAIL: Mapping[bytes, str] = {
     b"": "empty",
     b"PAR1": "a Parquet table; smpl.parquet is what `robojackson retarget` takes",
     b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.": "from before PyTorch 1.6; save it again",
-    b"\x78": "compressed; write it again with joblib.dump and compress=0",
+    **dict.fromkeys(
+        (b"x\x01", b"x\x5e", b"x\x9c", b"x\xda"),  # zlib; a text may begin with x
+        "compressed; write it again with joblib.dump and compress=0",
+    ),
     b"\x1f\x8b": "compressed with gzip; unpack it first",
 }
 """First bytes of files that cannot be read, and the remedy."""

@@ -38,6 +38,18 @@ def test_what_fails_on_a_range_leaves_no_file(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.medium
+def test_what_fails_keeps_the_range_of_an_earlier_run(tmp_path: Path) -> None:
+    with video_range(CLIP, None, tmp_path, (0.5, 1.5), "base", {}) as shown:
+        pass
+    with (
+        pytest.raises(KeyboardInterrupt),
+        video_range(CLIP, None, tmp_path, (0.5, 1.5), "base", {}),
+    ):
+        raise KeyboardInterrupt
+    assert probe(shown, VideoLimits()).duration_s == pytest.approx(1.0, abs=0.05)
+
+
 def test_two_cameras_have_no_range(tmp_path: Path) -> None:
     with (
         pytest.raises(BadConfiguration, match=r"two cameras exclude --start and --end"),

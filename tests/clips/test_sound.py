@@ -113,6 +113,26 @@ def test_a_trimmed_clip_keeps_its_sound_in_step(tmp_path: Path) -> None:
     assert flashes(film) == pytest.approx(heard, abs=0.02 + 0.5 / FPS)
 
 
+def test_a_range_after_the_end_of_the_sound_is_silent(tmp_path: Path) -> None:
+    clip = clip_of(clicks(1.0), 4.0, tmp_path)
+    assert read_sound(trim(clip, 2.0, 3.5, tmp_path / "part.mp4")) is None
+    part = read_sound(trim(clip, 0.5, 3.5, tmp_path / "part.mp4"))
+    assert part is not None
+    assert onsets(part.samples) == pytest.approx([0.25], abs=0.02)
+    assert len(part.samples) / RATE == pytest.approx(3.0, abs=0.05)
+
+
+def test_sound_is_read_from_where_it_is_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However long the video is before."""
+    clip = clip_of(clicks(6.0), 6.0, tmp_path)
+    monkeypatch.setattr("robojackson.clips.sound.LONGEST_S", 2.0)
+    part = read_sound(clip, 3.1)
+    assert part is not None
+    assert onsets(part.samples)[:3] == pytest.approx([0.15, 0.65, 1.15], abs=0.02)
+
+
 def test_trimming_a_silent_clip_leaves_it_silent(tmp_path: Path) -> None:
     pictures = [np.full((64, 64, 3), 10, np.uint8)] * (2 * FPS)
     clip = write_video(pictures, FPS, tmp_path / "clip.mp4")

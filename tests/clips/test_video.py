@@ -1,5 +1,6 @@
 """Laws of reading videos: what is there is reported, what is broken gets one clear line."""
 
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -53,6 +54,28 @@ def test_every_frame_is_read_in_order(write_video) -> None:
 def test_frames_have_no_padding_between_rows(write_video) -> None:
     image = next(read_frames(write_video(size=(90, 48))))
     assert image.flags.c_contiguous
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_anamorphic_pixels_are_made_square(tmp_path: Path, turned: bool) -> None:
+    """A disc is stored narrow, with pixels of 4:3, as HDV stores it."""
+    path, disc = tmp_path / "hdv.mp4", np.zeros((96, 96, 3), np.uint8)
+    cv2.ellipse(disc, (48, 48), (24, 32), 0, 0, 360, (255, 255, 255), -1)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=20)
+        stream.width, stream.height, stream.pix_fmt = 96, 96, "yuv420p"
+        stream.codec_context.sample_aspect_ratio = Fraction(4, 3)
+        for _ in range(10):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(disc)))
+        container.mux(stream.encode(None))
+    if turned:
+        turn_by_metadata(path)
+    info, image = probe(path, LIMITS), next(read_frames(path))
+    assert (info.width, info.height) == image.shape[1::-1] == ((96, 128) if turned else (128, 96))
+    spans = [np.ptp(np.flatnonzero(image[..., 0].max(axis) > 128)) for axis in (0, 1)]
+    assert spans[0] == pytest.approx(spans[1], abs=2)
+    small = next(timed_frames(path, short_side=48))[1]
+    assert small.shape[1::-1] == ((48, 64) if turned else (64, 48))
 
 
 @pytest.mark.parametrize("width", [64, 90])

@@ -186,3 +186,14 @@ def test_a_skeleton_without_legs_is_refused_with_its_joints() -> None:
 def test_a_damaged_file_is_reported(damage: object) -> None:
     with pytest.raises(BadTable, match="BVH"):
         bvh_tree.parse(damage(stick().decode()).encode())  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("turns", ["Zrotation Zrotation Yrotation", "Xrotation " * 2])
+def test_rotations_twice_about_one_axis_are_refused(turns: str) -> None:
+    text = (
+        stick()
+        .decode()
+        .replace("3 Zrotation Yrotation Xrotation", f"{len(turns.split())} {turns}", 1)
+    )
+    with pytest.raises(BadTable, match=r"LeftUpLeg: rotations about [ZX], [ZX]"):
+        bvh_tree.parse(text.encode())

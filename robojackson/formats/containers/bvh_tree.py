@@ -6,7 +6,7 @@ The root stands at its offset plus its position channels; positions of other nod
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -155,6 +155,9 @@ def _hierarchy(words: Iterator[str]) -> list[Node]:
             node.first, column = column, column + len(node.channels)
             if not set(node.channels) <= _CHANNELS:
                 raise BadTable(f"{WHERE}: {node.name}: unknown channels {node.channels[:9]}")
+            turns = [channel[0] for channel in node.channels if channel[1:] == _TURN]
+            if len(turns) > 3 or any(a == b for a, b in pairwise(turns)):
+                raise BadTable(f"{WHERE}: {node.name}: rotations about {', '.join(turns[:9])}")
         else:
             raise BadTable(f"{WHERE}: unknown word {word[:40]!r} in the hierarchy")
     raise StopIteration
