@@ -8,6 +8,7 @@ networks.safetensors     the newest networks, for other trainings to start from
 
 import logging
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,7 +19,9 @@ from robojackson.errors import RoboJacksonError, StoreError
 log = logging.getLogger(__name__)
 
 RESULTS = ("policy.safetensors", "networks.safetensors")
-CHECKPOINT, OLD_CHECKPOINT = "checkpoint", "checkpoint.old"
+CHECKPOINT, OLD_CHECKPOINT, REPLAY = "checkpoint", "checkpoint.old", "replay"
+OWN_REPLAY = re.compile(r"[0-9]{12}-[0-9]{12}\.npz|new\.part")
+"""Names of the files of a replay (`tqc.replay_files`)."""
 
 
 def newest_checkpoint(out: Path) -> Path | None:
@@ -83,7 +86,31 @@ def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[s
     shutil.rmtree(old, ignore_errors=True)
 
 
-def set_results_aside(out: Path) -> None:
+def begin(out: Path) -> None:
+    """Prepare the folder of a training that has no checkpoint: existing files are another's.
+
+    Raises:
+        StoreError: `checkpoint` or `replay` is not of a training of ours.
+    """
+    for name in (CHECKPOINT, OLD_CHECKPOINT):
+        if (out / name).is_dir() and any((out / name).iterdir()):
+            _refuse(out / name)
+    replay = out / REPLAY
+    if replay.is_dir():
+        if not all(OWN_REPLAY.fullmatch(file.name) for file in replay.iterdir()):
+            _refuse(replay)
+        shutil.rmtree(replay, ignore_errors=True)
+    _set_results_aside(out)
+
+
+def _refuse(folder: Path) -> None:
+    raise StoreError(
+        f"{folder}: holds files of something else, which a training here would replace; give "
+        "another folder (-o)"
+    )
+
+
+def _set_results_aside(out: Path) -> None:
     """Rename the results of another training, which those of a new one would replace."""
     for name in RESULTS:
         if (out / name).is_file():

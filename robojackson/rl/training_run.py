@@ -5,7 +5,6 @@ The rows of episodes contain no clock: repeating a run in steps gives the same t
 
 import json
 import logging
-import shutil
 import time
 from collections import deque
 from collections.abc import Iterable
@@ -17,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from robojackson.errors import TrainingDiverged
 from robojackson.rl import checkpoint_folder, walkers
-from robojackson.rl.checkpoint_folder import newest_checkpoint, set_results_aside, write_checkpoint
+from robojackson.rl.checkpoint_folder import newest_checkpoint, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.modes.track_mode import control_of
@@ -52,7 +51,7 @@ class Run:
         self, out: Path, config: TrainConfig, core: TrackingCore, task: Task, hooks: Hooks
     ) -> None:
         self.out, self.config, self.core, self.task = out, config, core, task
-        self._hooks, self._replay = hooks, out / "replay"
+        self._hooks, self._replay = hooks, out / checkpoint_folder.REPLAY
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
         self._budget, self._has_learnt = TrainingBudget(config), False
         self._saved = self._reported = time.monotonic()
@@ -65,8 +64,7 @@ class Run:
         self.trainer, self._saved_updates = trainer, 0
         folder = newest_checkpoint(self.out)
         if folder is None:  # existing files without one are another training's
-            shutil.rmtree(self._replay, ignore_errors=True)
-            set_results_aside(self.out)
+            checkpoint_folder.begin(self.out)
             return
         with checkpoint_folder.restoring(folder):
             state = json.loads((folder / "run.json").read_text())
@@ -177,9 +175,10 @@ class Run:
         """Return the policy, and the networks that other trainings can start from."""
         facts, of_files = self._facts(), self.core.mode.of_files
         layers = self._average.layers(self.trainer.layers(), self.trainer.updates())
+        kept = Networks(networks, facts).without_unseen(self.core.actor_size)
         return {
             "policy.safetensors": choice(Policy(layers, facts).with_first(of_files)).to_bytes(),
-            "networks.safetensors": Networks(networks, facts).with_first(of_files).to_bytes(),
+            "networks.safetensors": kept.with_first(of_files).to_bytes(),
         }
 
     def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:

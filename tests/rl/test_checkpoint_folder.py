@@ -7,9 +7,10 @@ import pytest
 from robojackson.errors import StoreError
 from robojackson.rl.checkpoint_folder import (
     OLD_CHECKPOINT,
+    REPLAY,
     RESULTS,
+    begin,
     newest_checkpoint,
-    set_results_aside,
     write_checkpoint,
 )
 
@@ -57,5 +58,21 @@ def test_between_the_two_renames_the_one_before_counts(tmp_path: Path) -> None:
 def test_results_of_another_training_are_renamed(tmp_path: Path) -> None:
     assert newest_checkpoint(tmp_path) is None
     (tmp_path / RESULTS[0]).write_text("another")
-    set_results_aside(tmp_path)
+    begin(tmp_path)
     assert contents(tmp_path) == {f"before-{RESULTS[0]}": "another"}
+
+
+@pytest.mark.parametrize("file", ["checkpoint/epoch1.pt", "replay/game.npz"])
+def test_files_of_something_else_stay(tmp_path: Path, file: str) -> None:
+    (tmp_path / file).parent.mkdir()
+    (tmp_path / file).write_text("another")
+    with pytest.raises(StoreError, match=r"something else.*give another folder"):
+        begin(tmp_path)
+    assert contents(tmp_path) == {file: "another"}
+
+
+def test_the_replay_of_a_training_without_a_checkpoint_goes(tmp_path: Path) -> None:
+    (tmp_path / REPLAY).mkdir()
+    (tmp_path / REPLAY / f"{0:012d}-{64:012d}.npz").write_bytes(b"old")
+    begin(tmp_path)
+    assert contents(tmp_path) == {}

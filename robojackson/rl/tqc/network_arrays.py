@@ -42,8 +42,12 @@ class Networks:
     @property
     def observation_size(self) -> int:
         """Return the length of the observation that the actor takes."""
-        first = "actor.0.weight" if "actor.0.weight" in self.tensors else "mean.weight"
-        return int(self.tensors[first].shape[0])
+        return int(self.tensors[self._first].shape[0])
+
+    @property
+    def _first(self) -> str:
+        """Return the name of the actor's first weights."""
+        return "actor.0.weight" if "actor.0.weight" in self.tensors else "mean.weight"
 
     @property
     def action_size(self) -> int:
@@ -64,6 +68,13 @@ class Networks:
         """Return the units of every layer of a part."""
         names = (f"{part}.{i}.weight" for i in count())
         return tuple(self.tensors[n].shape[1] for n in takewhile(self.tensors.__contains__, names))
+
+    def without_unseen(self, seen: int) -> "Networks":
+        """Return the networks with zeros where the actor's first weights are those of inputs that
+        it does not see, which no update reaches: those after `seen`."""
+        weight = self.tensors[self._first].copy()
+        weight[seen:] = 0.0
+        return replace(self, tensors={**self.tensors, self._first: weight})
 
     def with_first(self, change: Callable[[np.ndarray], np.ndarray]) -> "Networks":
         """Return the networks with other weights from their observation on."""

@@ -1,5 +1,6 @@
 """A policy file of ours as a tracker: trained on many motions, it sees the reference ahead."""
 
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,12 @@ class _PolicyFollower:
 
     def __init__(self, policy: Policy, robot: Robot, n: int) -> None:
         self._actor, self._hinge = Actor(policy, robot, n), Motors.of(robot.model).hinge
+
+    def __copy__(self) -> "_PolicyFollower":
+        """Return the same robots with a past of their own from now on."""
+        twin = object.__new__(type(self))
+        twin._actor, twin._hinge = copy(self._actor), self._hinge
+        return twin
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order."""

@@ -36,7 +36,8 @@ class TrackerInput:
 
 
 class Follower(Protocol):
-    """N robots that follow; stores the past that the network needs."""
+    """N robots that follow; stores the past that the network needs. A `copy.copy` of it goes on by
+    itself: a performance looks ahead with one."""
 
     def targets(self, seen: TrackerInput) -> Float[np.ndarray, "N nu"]:
         """Return target hinge angles of the PD law, rad, in actuator order; once a control step."""

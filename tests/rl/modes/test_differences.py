@@ -15,7 +15,7 @@ from robojackson.rl.modes.differences import ROOT_INPUTS, Differences
 from robojackson.rl.modes.observation import Observer
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.sim.reference_clip import Clip
-from robojackson.rl.tqc.network_arrays import load_networks
+from robojackson.rl.tqc.network_arrays import Networks, load_networks
 from robojackson.rl.training import train_policy
 from robojackson.robot.model import Robot
 
@@ -85,6 +85,21 @@ def test_a_files_critic_judges_the_whole_observation_as_the_learnt_one_did(
     assert len(kept) == whole.observation_size + robot.model.nu
     judged = np.concatenate([all_of_it, action], 1) @ kept
     np.testing.assert_allclose(judged, np.concatenate([seen, action], 1) @ learnt, atol=1e-4)
+
+
+def test_a_files_networks_act_without_what_the_actor_has_not_seen(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """Weights of unseen inputs stay as random as they began."""
+    core = TrackingCore(robot, sway, TRACK, 4, 0)
+    whole = TrackingCore(robot, sway, replace(TRACK, differences=False), 4, 0)
+    learnt = np.random.default_rng(7).normal(0, 0.3, (core.observation_size, 6))
+    networks = Networks({"actor.0.weight": learnt}, {}).without_unseen(core.actor_size)
+    kept = networks.with_first(core.mode.of_files).tensors["actor.0.weight"]
+    seen, all_of_it = (each.reset() for each in (core, whole))
+    np.testing.assert_allclose(
+        all_of_it @ kept, seen[:, : core.actor_size] @ learnt[: core.actor_size], atol=1e-4
+    )
 
 
 @pytest.mark.medium

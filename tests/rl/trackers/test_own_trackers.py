@@ -1,5 +1,6 @@
 """Our own trackers: feedback along the reference, and a policy of many motions."""
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +16,11 @@ from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.feedback import path_search, path_trial, sampled_regulator
 from robojackson.rl.modes.observation import AHEAD, Kind
 from robojackson.rl.sim import accelerometer
+from robojackson.rl.sim.preview import preview_of
+from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
+from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.tracker_file import is_present, open_tracker
 from robojackson.robot.model import Robot
@@ -100,6 +104,22 @@ def test_a_policy_of_many_motions_is_a_tracker(
     as_tracker = evaluate_policy(tracker, motion, robot, SHORT)
     as_policy = evaluate_policy(policy, motion, robot, SHORT)
     np.testing.assert_allclose(as_tracker.rollout_qpos, as_policy.rollout_qpos, atol=1e-9)
+
+
+def test_a_copy_of_followers_leaves_the_last_actions_of_the_original(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """A performance looks ahead with copies."""
+    path = random_policy(robot, sway, "preview").save(tmp_path / "dancer.safetensors")
+    window = (replace(Clip(sway).at(np.array([7])), preview=preview_of(sway, robot)[[7]]),)
+    seen = TrackerInput(sway.qpos[[6]], sway.qvel[[6]], sway.keypoints_w[[6]], window)
+    robots, alone = (PolicyTracker(REGULATOR, path).follow(robot, 1) for _ in range(2))
+    ahead = copy(robots)
+    first = [ahead.targets(seen) for _ in range(3)]
+    np.testing.assert_array_equal(robots.targets(seen), first[0])
+    assert np.abs(first[1] - first[0]).max() > 0
+    for _ in range(2):
+        np.testing.assert_array_equal(alone.targets(seen), first.pop(0))
 
 
 def test_a_policy_on_top_of_feedback_is_none(motion: ReferenceMotion, tmp_path: Path) -> None:
