@@ -18,7 +18,8 @@ from robojackson.errors import RoboJacksonError, StoreError
 
 log = logging.getLogger(__name__)
 
-RESULTS = ("policy.safetensors", "networks.safetensors")
+NETWORKS = "networks.safetensors"
+RESULTS = ("policy.safetensors", NETWORKS)
 CHECKPOINT, OLD_CHECKPOINT, REPLAY = "checkpoint", "checkpoint.old", "replay"
 OWN_REPLAY = re.compile(r"[0-9]{12}-[0-9]{12}\.npz|new\.part")
 """Names of the files of a replay (`tqc.replay_files`)."""

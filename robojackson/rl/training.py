@@ -15,6 +15,7 @@ from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
+from robojackson.rl.checkpoint_folder import NETWORKS, newest_checkpoint
 from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.track_config import RandomConfig
 from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConfig, TrainConfig
@@ -32,6 +33,7 @@ from robojackson.rl.tqc.network_arrays import (
     Networks,
     chosen,
     fitted,
+    load_networks,
     widened,
     with_exploration,
 )
@@ -39,6 +41,7 @@ from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained
 from robojackson.rl.training_run import Run
 from robojackson.rl.training_task import Task, TrainResult
+from robojackson.rl.walkers import SCRATCH
 from robojackson.robot.model import Robot
 
 __all__ = ["Hooks", "TrainResult", "train_policy"]
@@ -69,7 +72,7 @@ def train_policy(
     if not config.has_budget:
         raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
     hooks = hooks or Hooks()
-    networks = pretrained(config.start, config.mode, robot.description)
+    networks = _start(config, robot, out)
     out.mkdir(parents=True, exist_ok=True)
     held = held_alone(config, robot, reference)
     environment, of_tqc = config.environment, (config.tqc.n_envs, config.seed)
@@ -101,6 +104,15 @@ def train_policy(
     finally:
         env.close()
     return run.result()
+
+
+def _start(config: TrainConfig, robot: Robot, out: Path) -> Networks | None:
+    """Return the networks that a training begins with; where it goes on, those of its checkpoint,
+    so that the file of its start may be gone."""
+    own = out / NETWORKS
+    if config.start != SCRATCH and newest_checkpoint(out) is not None and own.is_file():
+        return load_networks(own)
+    return pretrained(config.start, config.mode, robot.description)
 
 
 def _is_chosen(out: Path) -> bool:
@@ -147,9 +159,18 @@ def residual_learning(
     if not polishes(config, robot, reference, held):
         return config.tqc
     log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
-    polish = replace(config.tqc, **PRESETS["polish"])
+    preset, usual = dict(PRESETS["polish"]), TqcConfig()
     if control_of(config.track).root_state == "estimated":
-        return replace(polish, action_penalty=ESTIMATED_PENALTY)
+        preset["action_penalty"] = ESTIMATED_PENALTY
+    asked = [name for name in preset if getattr(config.tqc, name) != getattr(usual, name)]
+    polish = replace(config.tqc, **{n: x for n, x in preset.items() if n not in asked})
+    if config.steps is not None and polish.burn_in >= config.steps:
+        log.warning(
+            "the critics learn alone for %s transitions (tqc.burn_in) and the budget is %s: the "
+            "policy will do what the feedback alone does",
+            f"{polish.burn_in:,}",
+            f"{config.steps:,}",
+        )
     return polish
 
 
@@ -184,7 +205,7 @@ def polishes(
 ) -> bool:
     """Return whether a training begins with what the feedback alone does (`residual_learning`)."""
     track, motions = config.track, motions_of(reference)
-    usual = config.trainer == "sbx" and config.start == "scratch"
+    usual = config.trainer == "sbx" and config.start == SCRATCH
     path = feedback_path(robot, control_of(track))
     fed = is_fed(config, robot.description) and path == "sampled"
     better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)

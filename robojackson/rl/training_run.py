@@ -178,7 +178,7 @@ class Run:
         kept = Networks(networks, facts).without_unseen(self.core.actor_size)
         return {
             "policy.safetensors": choice(Policy(layers, facts).with_first(of_files)).to_bytes(),
-            "networks.safetensors": kept.with_first(of_files).to_bytes(),
+            checkpoint_folder.NETWORKS: kept.with_first(of_files).to_bytes(),
         }
 
     def _require_finite(self, arrays: Iterable[np.ndarray]) -> None:

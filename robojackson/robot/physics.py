@@ -7,6 +7,7 @@ description without these keys compiles to the stock model.
 from collections.abc import Iterator
 
 import mujoco
+import numpy as np
 
 from robojackson.robot.actuation import per_hinge
 from robojackson.robot.description import RobotDescription
@@ -22,7 +23,8 @@ def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     """Write joints, armature, motors, friction and the stepping of the description into a spec.
 
     A hinge with a torque limit that no torque motor of the MJCF drives gets one: its gear is the
-    limit, its control -1..1. A position or velocity servo of that hinge goes: the PD law is ours.
+    limit, its control -1..1; one that the MJCF has gets another control range, where its limit is
+    another. A position or velocity servo of that hinge goes: the PD law is ours.
 
     Raises:
         UnknownName: a hinge, body or pattern that matches none.
@@ -35,11 +37,15 @@ def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     limits = per_hinge(description.torque_limits, names, where(description, "torque_limits"))
     limited = {name for name, limit in zip(names, limits, strict=True) if limit == limit}
     _remove_servos(spec, limited)
-    driven = {actuator.target for actuator in spec.actuators}
+    motors = _motors(spec)
     for hinge, inertia, limit in zip(hinges, armature, limits, strict=True):
         if inertia == inertia:  # a number
             hinge.armature = inertia
-        if hinge.name in limited and hinge.name not in driven:
+        if hinge.name not in limited:
+            continue
+        if hinge.name in motors:
+            _limit(motors[hinge.name], float(limit))
+        else:
             _add_motor(spec, hinge.name, float(limit))
     _step_as(spec, description)
 
@@ -61,6 +67,27 @@ def _remove_servos(spec: mujoco.MjSpec, hinges: set[str]) -> None:
     }
     if servos:
         remove(spec, actuators=servos)
+
+
+def _motors(spec: mujoco.MjSpec) -> dict[str, list[mujoco.MjsActuator]]:
+    """Return the actuators of each joint."""
+    found: dict[str, list[mujoco.MjsActuator]] = {}
+    for actuator in spec.actuators:
+        if actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT:
+            found.setdefault(actuator.target, []).append(actuator)
+    return found
+
+
+def _limit(motors: list[mujoco.MjsActuator], limit: float) -> None:
+    """Give the motors of one joint the control ranges with which they give a torque at most, Nm."""
+    force = [abs(each.gear[0] * each.gainprm[0]) for each in motors]
+    torque = sum(f * np.abs(each.ctrlrange).max() for f, each in zip(force, motors, strict=True))
+    for each, own in zip(motors, force, strict=True):
+        if torque > 0 and not np.isclose(torque, limit):
+            each.ctrlrange = np.asarray(each.ctrlrange) * (limit / torque)
+        elif torque == 0 and own > 0:  # no range in the MJCF
+            each.ctrlrange = np.array([-1.0, 1.0]) * limit / (own * len(motors))
+            each.ctrllimited = True
 
 
 def _add_motor(spec: mujoco.MjSpec, hinge: str, limit: float) -> None:

@@ -17,7 +17,9 @@ def resample(
     """Return qpos at fractional frame indices; a cycle continues with its first frame, moved by
     `cycle`."""
     rows = continuous(qpos)
-    if cycle_offset is None:
+    if cycle_offset is None and len(rows) == 1:
+        out = np.repeat(rows, len(steps), 0)
+    elif cycle_offset is None:
         out = CubicSpline(np.arange(len(rows)), rows)(steps)
     else:
         out = _periodic(rows, steps, cycle_offset)

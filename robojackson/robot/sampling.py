@@ -60,7 +60,8 @@ def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMoti
         before, after = np.clip([before, after], 0, len(reference) - 1)
     cycle_offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
     moved = difference(resample(qpos, before, cycle_offset), resample(qpos, after, cycle_offset))
-    qvel = moved / ((after - before) * reference.dt)[:, None]
+    seconds = np.maximum(after - before, _HALF_WIDTH) * reference.dt  # 0 in a motion of one step
+    qvel = moved / seconds[:, None]
     return SampledMotion(float(fps), resample(qpos, steps, cycle_offset), qvel)
 
 

@@ -22,6 +22,15 @@ RATES = (30, 50, 120)
 
 
 @pytest.mark.parametrize("fps", RATES)
+def test_a_motion_of_one_step_is_a_frame_that_stands(swaying: ReferenceMotion, fps: int) -> None:
+    rows = {name: getattr(swaying, name)[:1] for name in ("qpos", "qvel", "keypoints_w", "contact")}
+    found = sampled(replace(swaying, cyclic=False, **rows), fps)
+    np.testing.assert_array_equal(found.qpos, swaying.qpos[:1])
+    assert found.qvel is not None
+    assert not found.qvel.any()
+
+
+@pytest.mark.parametrize("fps", RATES)
 @pytest.mark.parametrize("cyclic", [True, False])
 def test_frames_lie_on_the_motion(swaying: ReferenceMotion, fps: int, cyclic: bool) -> None:
     found = sampled(replace(swaying, cyclic=cyclic), fps).qpos

@@ -48,6 +48,19 @@ def test_a_training_starts_from_the_actor_of_a_policy_with_the_noise_that_is_set
     assert networks.has_critics
 
 
+def test_a_training_goes_on_without_the_file_that_it_started_from(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    start = random_policy(robot, sway).save(tmp_path / "given.safetensors")
+    track = TrackConfig("onboard", control=replace(TrackConfig().control, feedback=0.0))
+    config = TrainConfig(steps=16, start=str(start), tqc=QUIET, track=track)
+    train_policy(sway, robot, config, tmp_path / "run")
+    start.unlink()
+    assert train_policy(sway, robot, replace(config, steps=32), tmp_path / "run").steps == 32
+    with pytest.raises(BadPolicy, match="no such file"):
+        train_policy(sway, robot, config, tmp_path / "another")
+
+
 def test_a_policy_that_sees_something_else_is_refused(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:

@@ -35,6 +35,19 @@ def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> No
     )
 
 
+def test_what_is_set_by_hand_goes_before_the_preset_of_a_polish(
+    fed: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
+) -> None:
+    ending = replace(sway, cyclic=False)
+    own = {"tqc.burn_in": 40, "tqc.action_penalty": 0.01}
+    tqc = residual_learning(configured(**own), fed, ending, 0.5)
+    assert (tqc.burn_in, tqc.action_penalty) == (40, 0.01)
+    assert tqc.log_std_init == PRESETS["polish"]["log_std_init"]
+    assert not caplog.records
+    residual_learning(configured(), fed, ending, 0.5)
+    assert "for 50,000 transitions (tqc.burn_in) and the budget is 100" in caplog.text
+
+
 def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:
     repeating = replace(sway, cyclic=True)
     for held in (0.89, np.nan):

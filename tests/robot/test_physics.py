@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -12,6 +13,7 @@ from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.retarget.solver.collision import Detector
 from robojackson.rl.modes.reset_states import default_standing_pose
+from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.trainable import require_trainable
 from robojackson.robot.description import FallRule, RobotDescription, SimulationDescription
 from robojackson.robot.fall import Fall, standing_height, up_axis
@@ -153,6 +155,55 @@ def test_a_body_that_is_welded_to_a_foot_is_of_the_foot(on_balls: Robot) -> None
     stand = default_standing_pose(on_balls)
     assert Detector(on_balls, 0.01).touches(stand[None]).floor.any()
     assert not Detector(on_balls, 0.01, feet=False).touches(stand[None]).floor.any()
+
+
+def with_motors(path: Path, change: Callable[[str], str]) -> str:
+    """Write the stock humanoid with other actuators; return the path of its MJCF."""
+    found = importlib.util.find_spec("gymnasium")
+    assert found is not None
+    assert found.origin is not None
+    text = (Path(found.origin).parent / "envs/mujoco/assets/humanoid.xml").read_text()
+    start = text.index("<actuator>")
+    path.write_text(text[:start] + change(text[start:]))
+    return str(path)
+
+
+@pytest.mark.parametrize("gain", [1.0, -50.0])
+def test_a_motor_of_the_mjcf_gives_what_the_yaml_allows(tmp_path: Path, gain: float) -> None:
+    """What retargeting reckons with is what the simulation gives, whatever its gear and gain."""
+    general = f'<general gainprm="{gain}" '
+    mjcf = with_motors(tmp_path / "motors.xml", lambda text: text.replace("<motor ", general))
+    robot = altered(mjcf=mjcf, torque_limits={"*": 30.0, "abdomen_z": 10.0})
+    require_trainable(robot)
+    motors, data = Motors.of(robot.model), mujoco.MjData(robot.model)
+    np.testing.assert_allclose(motors.limit, robot.torque_limit[motors.hinge])
+    data.ctrl[:] = 2 * motors.limit / motors.gear
+    mujoco.mj_forward(robot.model, data)
+    np.testing.assert_allclose(data.qfrc_actuator[6:][motors.hinge], motors.limit)
+
+
+@pytest.mark.parametrize(
+    "kind", ['general dyntype="filter" dynprm=".1"', 'motor ctrlrange="-1 .5"']
+)
+def test_a_motor_that_the_control_law_cannot_use_is_refused(tmp_path: Path, kind: str) -> None:
+    mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace("<motor ", f"<{kind} ", 1))
+    with pytest.raises(BadConfiguration, match=r"'abdomen_y' is not (a torque motor|the same in)"):
+        require_trainable(altered(mjcf=mjcf, torque_limits={}))
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "ellipsoid"])
+def test_the_stand_is_on_the_floor_on_round_soles(tmp_path: Path, shape: str) -> None:
+    described, text = machine.description(tmp_path), machine.mjcf()
+    round_sole = f'type="{shape}" size=".04 .02 .03" euler="20 30 0" pos=".03'
+    assert 'type="box" size=".07 .03 .01" pos=".03' in text
+    text = text.replace('type="box" size=".07 .03 .01" pos=".03', round_sole)
+    Path(described.mjcf).write_text(text)
+    robot = load_robot(described)
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = default_standing_pose(robot)
+    data.qpos[2] -= 1e-4
+    mujoco.mj_forward(robot.model, data)
+    assert data.contact.dist.min() == pytest.approx(-1e-4, abs=2e-6)
 
 
 @pytest.mark.parametrize("mesh", [False, True])

@@ -26,12 +26,13 @@ class SimulatedRobot:
     def drive(self, target: np.ndarray, stiffness: np.ndarray, damping: np.ndarray) -> None:
         """Run one control step of the PD law, within the limits of joints, torque and speed."""
         most, fastest = self.limits["torque"], self.limits["speed"]
+        gear = (self.model.actuator_gear * self.model.actuator_gainprm[:, :1])[self.motors, 0]
         target = np.clip(target, self.limits["lower"], self.limits["upper"])
         for _ in range(self.substeps):
             angle, rate = self.data.qpos[7:], self.data.qvel[6:]
             torque = np.clip(stiffness * (target - angle) - damping * rate, -most, most)
             torque[(np.abs(rate) > fastest) & (torque * rate > 0)] = 0.0
-            self.data.ctrl[self.motors] = torque / self.model.actuator_gear[self.motors, 0]
+            self.data.ctrl[self.motors] = torque / gear
             mujoco.mj_step(self.model, self.data)
             if self.hung is not None:
                 self.data.qpos[:7], self.data.qvel[:6] = self.hung, 0.0

@@ -80,7 +80,8 @@ def better_of(
     trained, alone = tried(TRAINED), tried(REGULATOR)
     beside = {"trained": trained.strict, "feedback": alone.strict}
     skills = {"trained_skill": trained.skill, "feedback_skill": alone.skill}
-    facts = {**policy.facts, BESIDE: {**beside, **skills}}
+    known = {name: value for name, value in skills.items() if np.isfinite(value)}  # no statue's
+    facts = {**policy.facts, BESIDE: {**beside, **known}}
     if not alone.better_than(trained):
         return replace(policy, facts=facts)
     log.warning(

@@ -135,13 +135,17 @@ def standing_pose_at(stand: Float[np.ndarray, " nq"], root: Float[np.ndarray, " 
 
 
 def _reach_down(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
-    """Return the extent of a sphere, capsule, box or mesh below its centre, metres."""
+    """Return the extent of a geom below its centre, metres."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
     up = data.geom_xmat[geom].reshape(3, 3)[2]
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
         return float(size[0] + size[1] * abs(up[2]))
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
         return float(size @ np.abs(up))
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return float(size[0] * np.hypot(up[0], up[1]) + size[1] * abs(up[2]))
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return float(np.linalg.norm(size * up))
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = model.geom_dataid[geom]
         first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]

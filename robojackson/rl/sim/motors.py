@@ -20,8 +20,8 @@ class Motors:
 
     Attributes:
         hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
-        gear: Torque per unit of control, N m.
-        limit: Largest torque, N m (gear x the control range).
+        gear: Torque per unit of control, N m: gear and gain of the actuator.
+        limit: Largest torque, N m (that, in size, x the control range).
     """
 
     hinge: Int[np.ndarray, " nu"]
@@ -31,11 +31,11 @@ class Motors:
     @staticmethod
     def of(model: mujoco.MjModel) -> "Motors":
         """Return the motors of a model whose first joint is free and whose others are hinges."""
-        gear = model.actuator_gear[:, 0].copy()
+        gear = model.actuator_gear[:, 0] * model.actuator_gainprm[:, 0]
         return Motors(
             hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
             gear=gear,
-            limit=gear * model.actuator_ctrlrange[:, 1],
+            limit=np.abs(gear) * model.actuator_ctrlrange[:, 1],
         )
 
 

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from jaxtyping import Bool
 
 from robojackson.errors import BadConfiguration
 from robojackson.robot.fall import Fall, standing_height
@@ -15,17 +16,16 @@ def require_trainable(robot: Robot) -> None:
         BadConfiguration: it has no torque motors with a range, or it is too small.
     """
     model, reason, fall = robot.model, "", Fall.of(robot)
-    motors = (
-        (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
-        & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
-        & (model.actuator_ctrllimited > 0)
-    )
+    motors, low, high = _torque_motors(model), *model.actuator_ctrlrange.T
     height = standing_height(robot)
     if not model.nu:
         reason = "neither its MJCF nor torque_limits of its YAML give it motors"
     elif not motors.all():
         name = model.actuator(int(np.argmin(motors))).name
         reason = f"actuator {name!r} is not a torque motor with a control range"
+    elif not np.allclose(low, -high):
+        name = model.actuator(int(np.argmax(np.abs(low + high)))).name
+        reason = f"the control range of motor {name!r} is not the same in both directions"
     elif not fall.relative and height < fall.height:
         reason = (
             f"it stands with its root {height:.2f} m above the floor, and less than "
@@ -36,3 +36,16 @@ def require_trainable(robot: Robot) -> None:
             f"training is not possible on robot {robot.description.name!r} yet: {reason}; "
             "retargeting, its video and export are"
         )
+
+
+def _torque_motors(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:
+    """Return whether each actuator is a joint's motor whose torque is proportional to its control,
+    at once and within a range."""
+    return (
+        (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
+        & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
+        & (model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
+        & (model.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_NONE))
+        & (model.actuator_gear[:, 0] * model.actuator_gainprm[:, 0] != 0)
+        & (model.actuator_ctrllimited > 0)
+    )

@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.evaluation import polish_choice
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts
-from robojackson.rl.policy import Policy
+from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.model import Robot
 
@@ -63,6 +64,19 @@ def test_a_policy_that_loses_what_the_feedback_holds_is_left_out(
     skills = {f"{name}_skill": share for name, share in held.items()}
     assert policy.facts["beside_feedback"] == pytest.approx({**held, **skills})
     assert "holds 90 % of 49 starts with skill 0.90, with the policy 86 % with 0.86" in caplog.text
+
+
+@pytest.mark.medium
+def test_a_motion_that_does_not_move_has_no_skill_and_its_policy_is_read_again(
+    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    rows = np.zeros(len(sway), int)
+    still = dataclasses.replace(
+        sway, qpos=sway.qpos[rows], qvel=0 * sway.qvel, keypoints_w=sway.keypoints_w[rows]
+    )
+    policy = chosen(robot, still, monkeypatch, {"trained": 0, "regulator": 0})
+    again = load_policy(policy.save(tmp_path / "policy.safetensors"))
+    assert again.facts["beside_feedback"] == {"trained": 1.0, "feedback": 1.0}
 
 
 @pytest.mark.medium
