@@ -43,7 +43,12 @@ def closing(answer: Answer) -> list[str]:
 
 def command_line(*words: object) -> str:
     """Return a command that can be copied into a shell."""
-    return shlex.join([program(), *map(str, words)])
+    return shlex.join([*program(), *map(str, words)])
+
+
+def of_robot(robot: str | None) -> tuple[str, ...]:
+    """Return the words that name again the robot that a command was given; none without one."""
+    return () if robot is None else ("--robot", robot)
 
 
 def score_lines(answer: Answer) -> list[str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from robojackson.cli import cards, console
+from robojackson.cli.lifetime.interruption import python
 from robojackson.cli.trackers.named_tracker import is_tracker
 from robojackson.errors import BadConfiguration
 from robojackson.files.foreign_file import require_file
@@ -118,7 +119,7 @@ def _deploy(
     rights = {f"may_{name}": answer for name, answer in made.pop("licences").items()}
     made["files"] = len(made["files"])
     verdict = {"verdict": {"kind": kind, "sentence": sentence}}
-    following = {"next": shlex.join(["python", str(out / "run.py"), "--view"])}
+    following = {"next": shlex.join([python(), str(out / "run.py"), "--view"])}
     figures = {"folder": str(out), "format": DEPLOY, **made, **rights}
     return figures | {"seconds": time.monotonic() - began} | verdict | following
 
@@ -139,7 +140,7 @@ def _open_points(made: Mapping[str, Any]) -> list[str]:
 def _policy_verdict(out: Path) -> dict[str, object]:
     sentence = "The file computes the policy: observations in, actions out."
     check = f"import onnxruntime as o; print(o.InferenceSession({str(out)!r}).get_inputs())"
-    following = shlex.join(["python", "-c", check])
+    following = shlex.join([python(), "-c", check])
     return {"verdict": {"kind": "written", "sentence": sentence}, "next": following}
 
 
@@ -149,19 +150,27 @@ def _person_verdict(motion: SmplSequence, to: str, out: Path) -> dict[str, objec
     verdict: dict[str, object] = {"verdict": {"kind": "written", "sentence": sentence}}
     if to not in registry.importers():
         return verdict
-    return verdict | {"next": cards.command_line("import", out, "-o", out.with_suffix(""))}
+    folder = out.with_name(f"{out.stem}_imported")
+    return verdict | {"next": cards.command_line("import", out, "-o", folder)}
 
 
 def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:
     """Return the verdict on a robot's motion from its own score card, which an export does not
     change."""
-    card, words = scorecard_record(motion), ("train", source, "-o", source.parent / "training")
+    card, folder = scorecard_record(motion), source.parent
     verdict = cards.retarget_verdict(card)
     if not set(BARS) & set(card):
         sentence = "The motion has no score card: no check that the robot can do it was made."
         verdict = {"kind": "unchecked", "sentence": sentence}
-    if verdict["kind"] != "feasible":
-        words = ("retarget", source.parent / "smpl.parquet", "-o", source.parent)
+    if verdict["kind"] == "feasible":
+        return {
+            "verdict": verdict,
+            "next": cards.command_line("train", source, "-o", folder / "training"),
+        }
+    person, robot = folder / "smpl.parquet", motion.robot_file or motion.robot
+    if not person.is_file():
+        return {"verdict": verdict}
+    words = ("retarget", person, "-o", folder, "--robot", robot)
     return {"verdict": verdict, "next": cards.command_line(*words)}
 
 

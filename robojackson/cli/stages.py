@@ -126,7 +126,7 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     from robojackson.api.robots import load_robot
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.retarget.scorecard_gate import scorecard_record
+    from robojackson.retarget.scorecard_gate import failures, scorecard_record
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
@@ -149,7 +149,10 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
         "cyclic": reference.cyclic,
         "scorecard": scorecard,
         "verdict": cards.retarget_verdict(scorecard),
-        "next": cards.command_line("train", out / "reference.parquet", "-o", out / "training"),
+        "next": cards.command_line(
+            *("train", out / "reference.parquet", "-o", out / "training"),
+            *(["--force"] if failures(scorecard) else []),
+        ),
         "seconds": time.monotonic() - began,
     }
 
@@ -198,14 +201,15 @@ def evaluate(
     summary = to_json_types(verdict.summary)
     if tracker is not None:
         estimated = tracker.description.root_state == "estimated"
-        following = pack_of(policy, reference, out) if estimated else train_this(reference)
+        packed = pack_of(policy, reference, out, robot)
+        following = packed if estimated else train_this(reference, robot)
     elif summary["verdict"]["kind"] == "dances" and is_fed_onboard(policy):
-        following = pack_of(policy, reference, out)
+        following = pack_of(policy, reference, out, robot)
     elif summary["verdict"]["kind"] == "dances":
         words = ("export", policy, "--to", "onnx", "-o", policy.with_suffix(".onnx"))
         following = cards.command_line(*words)
     else:
-        following = train_after(policy, reference, LONGER_MINUTES)
+        following = train_after(policy, reference, LONGER_MINUTES, robot)
     return {"policy": str(policy), "reference": str(reference), **summary, "next": following}
 
 

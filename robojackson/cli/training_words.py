@@ -7,6 +7,7 @@ from pathlib import Path
 from robojackson.cli import cards
 from robojackson.config import leaves
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.retarget.scorecard_gate import failures
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import load_policy
@@ -14,26 +15,38 @@ from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
 from robojackson.rl.training_task import completed_settings
 
 
-def train_this(reference: Path) -> str:
-    """Return the command that trains a policy of a motion, in a folder beside it."""
-    return cards.command_line("train", reference, "-o", reference.parent / "training")
+def train_this(reference: Path, robot: str | None = None) -> str:
+    """Return the command that trains a policy of a motion, in a folder beside it.
+
+    Args:
+        robot: What `--robot` was given; None where the motion names its robot.
+    """
+    words = ("train", reference, "-o", reference.parent / "training")
+    return cards.command_line(*words, *cards.of_robot(robot), *_forced(reference))
 
 
-def train_after(policy: Path, reference: Path, minutes: float) -> str:
+def train_after(policy: Path, reference: Path, minutes: float, robot: str | None = None) -> str:
     """Return the command after an evaluation of a policy that does not dance: more training, or,
     if it was trained on another motion, a training on this one."""
     if is_of_another_motion(load_policy(policy), ReferenceMotion.load(reference)):
-        return train_this(reference)
-    return train_longer(reference, policy.parent, minutes)
+        return train_this(reference, robot)
+    return train_longer(reference, policy.parent, minutes, robot)
 
 
-def train_longer(reference: Path, folder: Path, minutes: float) -> str:
+def train_longer(reference: Path, folder: Path, minutes: float, robot: str | None = None) -> str:
     """Return the command that trains on in a folder, with every setting that is not the default.
 
     A checkpoint refuses other settings, whether from a file, an option or `--set`.
     """
-    words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}")
-    return cards.command_line(*words, *(f"--set={each}" for each in _unusual(folder)))
+    words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}", *cards.of_robot(robot))
+    settings = (f"--set={each}" for each in _unusual(folder))
+    return cards.command_line(*words, *_forced(reference), *settings)
+
+
+def _forced(reference: Path) -> tuple[str, ...]:
+    """Return the words without which the gate refuses a training of a motion."""
+    known = reference.is_file() and failures(ReferenceMotion.load(reference).scorecard)
+    return ("--force",) if known else ()
 
 
 def _unusual(folder: Path) -> list[str]:
@@ -57,12 +70,13 @@ def is_fed_onboard(policy: Path) -> bool:
     return recorded_law(load_policy(policy)).get("root_state") == "estimated"
 
 
-def pack_of(tracker: Path, reference: Path, out: Path | None) -> str:
+def pack_of(tracker: Path, reference: Path, out: Path | None, robot: str | None = None) -> str:
     """Return the command that writes the deploy pack of a tracker.
 
     Args:
         out: Folder of its evaluation; None where none was written.
+        robot: What `--robot` was given; None where the motion names its robot.
     """
     given = () if out is None else ("--evaluation", out)
     words = ("export", tracker, "--to", "deploy", "--reference", reference, *given)
-    return cards.command_line(*words, "-o", (out or Path()) / "pack")
+    return cards.command_line(*words, "-o", (out or Path()) / "pack", *cards.of_robot(robot))

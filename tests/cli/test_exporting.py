@@ -80,9 +80,13 @@ def test_a_motion_that_no_robot_can_follow_is_retargeted_next(
     card: dict[str, float], kind: str, tmp_path: Path
 ) -> None:
     motion = replace(robot_motion("hip_shake"), scorecard=card, certificate=None)
-    result = export(motion.save(tmp_path / "r.parquet"), "csv", tmp_path / "motion.csv")
+    source, out = motion.save(tmp_path / "r.parquet"), tmp_path / "motion.csv"
+    result = export(source, "csv", out)
     assert result["verdict"]["kind"] == kind
-    assert result["next"].startswith("robojackson retarget ")
+    assert "next" not in result, "there is no person to retarget"
+    (tmp_path / "smpl.parquet").touch()
+    words = ("retarget", tmp_path / "smpl.parquet", "-o", tmp_path, "--robot", "humanoid")
+    assert export(source, "csv", out)["next"] == command_line(*words)
 
 
 @pytest.mark.medium

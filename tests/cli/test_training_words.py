@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.cli.training_words import train_after, train_longer
+from robojackson.cli.cards import command_line
+from robojackson.cli.training_words import train_after, train_longer, train_this
 from robojackson.motion.reference_motion import poses_sha256
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import Policy
@@ -51,6 +52,22 @@ def test_a_checkpoint_from_before_a_setting_insists_on_that_of_then(tmp_path: Pa
 
 def test_a_folder_without_a_checkpoint_is_trained_from_the_start(tmp_path: Path) -> None:
     assert train_longer(Path("r"), tmp_path, 20).endswith("--minutes 20")
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("robot", [None, "own.yaml"])
+def test_a_motion_that_the_gate_refuses_is_trained_on_by_force(
+    robot: str | None, tmp_path: Path
+) -> None:
+    motion = robot_motion("hip_shake")
+    words = () if robot is None else ("--robot", robot)
+    for share, force in ((0.0, ()), (0.5, ("--force",))):
+        card = {**motion.scorecard, "infeasible_share": share}
+        reference = replace(motion, scorecard=card).save(tmp_path / "reference.parquet")
+        expected = ("train", reference, "-o", tmp_path / "training", *words, *force)
+        assert train_this(reference, robot) == command_line(*expected)
+        longer = ("train", reference, "-o", tmp_path, "--minutes", 20, *words, *force)
+        assert train_longer(reference, tmp_path, 20, robot) == command_line(*longer)
 
 
 @pytest.mark.parametrize("same", [True, False])

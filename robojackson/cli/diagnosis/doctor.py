@@ -2,6 +2,7 @@
 Imports no Prefect."""
 
 import ctypes
+import shlex
 import shutil
 import sys
 from collections.abc import Mapping
@@ -90,7 +91,8 @@ def doctor_lines(found: Mapping[str, Any]) -> list[str]:
     count = len(found["missing"])
     if count:
         return [*rows, f"{count} required item{'s are' if count > 1 else ' is'} missing."]
-    return [*rows, "Everything required is installed.", f"next: {program()} dance"]
+    following = shlex.join([*program(), "dance"])
+    return [*rows, "Everything required is installed.", f"next: {following}"]
 
 
 def unsupported(version: tuple[int, int]) -> list[str]:

@@ -79,15 +79,17 @@ def train(
             there = newest_checkpoint(out)
             kept = f"the checkpoint is in {out}; resume" if there else "nothing learnt yet; again"
             raise console.Interrupted(f"{kept}: {console.same_command()}") from None
-    return _answer(trained, reference, out / "policy.safetensors")
+    return _answer(trained, reference, out / "policy.safetensors", robot)
 
 
-def _answer(trained: "TrainedPolicy", reference: Path, policy: Path) -> dict[str, Any]:
+def _answer(
+    trained: "TrainedPolicy", reference: Path, policy: Path, robot: str | None
+) -> dict[str, Any]:
     """Return the command's answer about a finished training."""
     config = trained.config
     survived = [row["survived_s"] for row in trained.episodes[-RECENT:]]
     verdict = cards.train_verdict(trained.updates, trained.steps, survived)
-    following = cards.command_line("evaluate", policy, reference)
+    following = cards.command_line("evaluate", policy, reference, *cards.of_robot(robot))
     if verdict["kind"] == "untrained":
         following = with_option("--minutes", f"{USUAL_MINUTES:g}", without=("--steps",))
     return {

@@ -7,7 +7,7 @@ its spread. Numpy; `tools/temporal/net.py` is its equivalent in torch, for train
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -101,13 +101,21 @@ def networks(weights: Weights) -> list[Weights]:
     return found
 
 
-@cache
 def load(path: Path) -> Weights:
-    """Return the arrays of a weights file, in single precision.
+    """Return the arrays of a weights file, in single precision; kept until the file changes.
 
     Raises:
         BadWeights: not safetensors, or arrays that are missing, of other shapes or not finite.
     """
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise BadWeights(f"{path}: not a weights file of the temporal network ({error})") from None
+    return _loaded(path, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=4)
+def _loaded(path: Path, mtime_ns: int, size: int) -> Weights:
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
 

@@ -1,5 +1,6 @@
 """Laws of step 3: what goes in, what comes out, what a mirror and a hidden limb do to it."""
 
+import os
 import re
 from pathlib import Path
 
@@ -190,6 +191,14 @@ def test_weights_of_which_an_array_is_cut_or_not_finite_are_refused(
         save_file({**whole, name: damaged}, path)
         with pytest.raises(BadWeights, match=f"{re.escape(name)} {said}"):
             temporal_network.load(path)
+
+
+def test_weights_that_were_trained_again_are_read_again(tmp_path: Path) -> None:
+    path, weights = tmp_path / "temporal.safetensors", load_file(WEIGHTS)
+    for factor in (1, 2):
+        save_file({**weights, "mean": factor * weights["mean"]}, path)
+        os.utime(path, ns=(0, factor))
+        np.testing.assert_array_equal(temporal_network.load(path)["mean"], factor * weights["mean"])
 
 
 def _rays(placed: np.ndarray) -> np.ndarray:
