@@ -16,7 +16,8 @@ def require_trainable(robot: Robot) -> None:
         BadConfiguration: it has no torque motors with a range, or it is too small.
     """
     model, reason, fall = robot.model, "", Fall.of(robot)
-    motors, low, high = _torque_motors(model), *model.actuator_ctrlrange.T
+    motors = _torque_motors(model)
+    low, high = model.actuator_ctrlrange[:, 0], model.actuator_ctrlrange[:, 1]
     height = standing_height(robot)
     if not model.nu:
         reason = "neither its MJCF nor torque_limits of its YAML give it motors"
@@ -41,7 +42,7 @@ def require_trainable(robot: Robot) -> None:
 def _torque_motors(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:
     """Return whether each actuator is a joint's motor whose torque is proportional to its control,
     at once and within a range."""
-    return (
+    usable: np.ndarray = (
         (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))
         & (model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))
         & (model.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
@@ -49,3 +50,4 @@ def _torque_motors(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:
         & (model.actuator_gear[:, 0] * model.actuator_gainprm[:, 0] != 0)
         & (model.actuator_ctrllimited > 0)
     )
+    return usable
