@@ -28,6 +28,7 @@ from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import REASON_LENGTH, Entry, reason_of, rows
 from flows.search.search_pipeline import search_and_rank
 from flows.video_pass.motion_stages import to_reference
+from robojackson.cli.options import yaml_text
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
@@ -98,13 +99,18 @@ async def refresh(
     return {"dances": done, "failed": failed, "not_due": waiting}
 
 
-def run(dances: list[str] | None, config: str, overrides: Mapping[str, Any]) -> Facts:
+def run(
+    dances: list[str] | None, config: str, overrides: Mapping[str, Any], robot: str | None = None
+) -> Facts:
     """Return the flow from the command line.
 
+    Args:
+        robot: Name or file of the robot of the motions; None takes the pipeline's.
     Raises:
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    return launch(refresh, dances, BOOK, config, dict(overrides))
+    chosen = {} if robot is None else {"robot": yaml_text(robot)}
+    return launch(refresh, dances, BOOK, config, dict(overrides), "base", chosen)
 
 
 @flow(name="refresh-dance", flow_run_name="{name}", task_runner=HUNTERS)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from robojackson.cli.console import CommandResult, command, log_to_stderr
-from robojackson.cli.options import Json, SetFind, overrides_from
+from robojackson.cli.options import Json, Robot, SetFind, overrides_from
 
 
 @command
@@ -56,6 +56,7 @@ def refresh(
     dances: Annotated[
         list[str] | None, typer.Argument(help="Names in configs/dances.yaml; else all that are due")
     ] = None,
+    robot: Robot = None,
     config: Annotated[str, typer.Option(help="Configuration of the search.")] = "finding",
     set_: SetFind = None,
     as_json: Json = False,
@@ -69,13 +70,13 @@ def refresh(
     from storage.store import Store
 
     overrides = overrides_from(set_)
-    check_refresh(dances or None, config, overrides)
+    check_refresh(dances or None, config, overrides, robot)
     prepare(Store.from_environment())
     with temporary_server():
         from flows.refresh import run
 
-        done = run(dances or None, config, overrides)
-    done |= refresh_verdict(done)
+        done = run(dances or None, config, overrides, robot)
+    done |= refresh_verdict(done, robot)
     code = 1 if done["failed"] and not done["dances"] else 0
     return CommandResult(done, code, text=[*refresh_lines(done), *closing(done)])
 

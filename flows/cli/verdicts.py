@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robojackson.cli.cards import command_line
+from robojackson.cli.cards import command_line, of_robot
 from robojackson.cli.lifetime.interruption import python, with_option
 from robojackson.clips.web.untrusted_text import clean_text
 
@@ -93,18 +93,22 @@ def refresh_lines(done: Facts) -> list[str]:
     return rows + [f"{name}: not due" for name in done["not_due"]]
 
 
-def refresh_verdict(done: Facts) -> dict[str, Any]:
-    """Return `verdict` and `next` of a refresh."""
+def refresh_verdict(done: Facts, robot: str | None = None) -> dict[str, Any]:
+    """Return `verdict` and `next` of a refresh.
+
+    Args:
+        robot: What `--robot` was given.
+    """
     dances, failed = done["dances"], done["failed"]
     new = [name for name, made in dances.items() if made["is_new"]]
     if not dances and not failed:
         waiting = ", ".join(done["not_due"]) or "there is none in configs/dances.yaml"
-        following = command_line("refresh", *done["not_due"][:1])
+        following = command_line("refresh", *done["not_due"][:1], *of_robot(robot))
         return _closing("not_due", f"No dance is due: {waiting}.", following)
     count = len(dances) + len(failed)
     sentence = f"{len(dances)} of {count} dances have a motion, {len(new)} of a new video."
     if failed:
-        return _closing("failed", sentence, command_line("refresh", *failed))
+        return _closing("failed", sentence, command_line("refresh", *failed, *of_robot(robot)))
     name = (new or list(dances))[0]
     following = command_line("train", dances[name]["reference"], "-o", name.replace(" ", "_"))
     return _closing("refreshed", sentence, following)

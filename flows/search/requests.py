@@ -13,7 +13,9 @@ from robojackson.clips.sources import source as source_of
 from robojackson.clips.web.reachability import require_reachable
 from robojackson.clips.web.untrusted_text import clean_text, web_address
 from robojackson.errors import SearchFailed
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import build, load
+from robojackson.robot.model import load_robot
 from storage import candidate_catalogue
 from storage.store import Store
 
@@ -86,11 +88,15 @@ def _require_video(address: str, settings: FindConfig, store: Store) -> None:
         log.warning("%s cannot be reached: its stored video is used", found.url)
 
 
-def check_refresh(dances: Sequence[str] | None, config: str, overrides: Mapping[str, Any]) -> None:
+def check_refresh(
+    dances: Sequence[str] | None, config: str, overrides: Mapping[str, Any], robot: str | None
+) -> None:
     """Raise what the nightly flow would raise much later.
 
     Raises:
-        UnknownName, BadConfiguration: a dance or the configuration cannot be used.
+        UnknownName, BadConfiguration: a dance, the configuration or the robot cannot be used.
     """
     load(FindConfig, config, overrides)
     load(DanceBook, "dances").pick(dances)
+    if robot is not None:
+        load_robot(describe_robot(robot))

@@ -22,10 +22,13 @@ from prefect.settings import (
 from configs.dance_book import Dance, DanceBook
 from flows import refresh as nightly
 from flows.refresh import refresh
+from flows.search.requests import check_refresh
 from flows.search.search_entries import Entry, SearchResult, rows
 from robojackson.clips.web.candidate_selection import Selection
 from robojackson.clips.web.video_candidate import VideoCandidate
-from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort
+from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort, UnknownName
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
 from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.store import Store
@@ -249,3 +252,19 @@ def test_dances_that_would_share_their_notes_are_refused() -> None:
     book = DanceBook((Dance(name="C", query="c"), Dance(name="C++", query="c plus plus")))
     with pytest.raises(BadConfiguration, match="'C' and 'C\\+\\+' have the same letters"):
         nightly._require_distinct(book)
+
+
+@pytest.mark.parametrize("robot", [None, "humanoid_strong"])
+def test_a_refresh_by_hand_is_for_the_robot_that_is_named(
+    robot: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[Any] = []
+    monkeypatch.setattr(nightly, "launch", lambda *words: given.extend(words))
+    nightly.run(["APT"], "finding", {}, robot)
+    pipeline, overrides = given[-2:]
+    assert load(PipelineConfig, pipeline, overrides).robot == (robot or PipelineConfig().robot)
+
+
+def test_a_refresh_for_a_robot_that_there_is_not_is_refused_before_it_begins() -> None:
+    with pytest.raises(UnknownName, match="unknown robot 'nosuch'"):
+        check_refresh(None, "finding", {}, "nosuch")

@@ -80,6 +80,7 @@ def test_a_refresh_trains_a_new_video_next() -> None:
 def test_a_refresh_that_failed_is_given_again() -> None:
     done = refreshed(a=True) | {"failed": {"b c": "no network"}}
     assert refresh_verdict(done)["next"] == "robojackson refresh 'b c'"
+    assert refresh_verdict(done, "g1")["next"] == "robojackson refresh 'b c' --robot g1"
     assert refresh_lines(done)[-1] == "b c: failed, no network"
 
 
