@@ -16,9 +16,11 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from configs.dance_book import Dance
 from configs.find_config import FindConfig
 from flows.runtime.launch import launch
+from flows.search.refresh_notes import KIND
 from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import Entry, SearchResult, rows, summary
 from flows.search.search_pipeline import download_candidates, search_and_rank
+from robojackson.clips.sources import folder
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import NoPersonFound, SearchFailed
 from robojackson.files.processor_cores import cores
@@ -73,21 +75,27 @@ async def best(
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, str]:
-    """Search, and download the chosen video in good quality; return its artifact."""
+    """Search, and download the steadiest video, or the one of the nightly refresh where that is
+    steadier, in good quality; return its artifact."""
     settings = load(FindConfig, config, overrides)
     requested = build(Dance, dance, "dance")
     store = Store.from_environment()
+    reigning = candidate_catalogue.champion(store, requested.name, KIND)
     try:
-        found = search_and_rank(requested, settings, run_id("dance"))
+        found = search_and_rank(requested, settings, run_id("dance"), reigning=reigning)
     except SearchFailed:
-        reigning = candidate_catalogue.champion(store, requested.name)
-        if reigning is None:
+        kept = reigning or candidate_catalogue.champion(store, requested.name)
+        if kept is None:
             raise
-        return {"key": reigning["video_key"], "sha256": reigning["video_sha256"]}
+        return asdict(_stored(_candidate(kept), _scored(kept)) or _scored(kept))
     table = rows(found)
-    await publish_search(requested.name, table, table[0] if found.chosen else None)
-    if found.chosen is None:
+    chosen = table[0] if found.chosen else reigning
+    await publish_search(requested.name, table, chosen)
+    if chosen is None:
         raise NoPersonFound(nothing(found))
+    if found.chosen is None:
+        get_run_logger().info("%s: no new video is steadier than %s", name, chosen["url"])
+        return asdict(of_champion(chosen, settings))
     return asdict(in_good_quality(found.chosen, settings))
 
 
@@ -99,8 +107,8 @@ def in_good_quality(chosen: Entry, settings: FindConfig) -> Artifact:
 def of_candidate(
     candidate: VideoCandidate, scored: Artifact | None, settings: FindConfig
 ) -> Artifact:
-    """Return the best format of a video, or its scored file when that cannot be downloaded, or
-    what an earlier run has downloaded.
+    """Return the best format of a video, or, where that cannot be downloaded, the largest file of
+    an earlier run, or the scored one.
 
     Raises:
         SearchFailed: none is there.
@@ -108,11 +116,37 @@ def of_candidate(
     ((_, video),) = download_candidates([candidate], "dance", settings)
     if isinstance(video, Artifact):
         return video
-    stored = scored or stored_video(Store.from_environment(), WebVideo.of(candidate))
+    stored = _stored(candidate, scored)
     if stored is None:
         raise SearchFailed(f"{candidate.title or candidate.video_id}: {video}")
     get_run_logger().warning("%s: %s: its stored video is used", candidate.url, video)
     return stored
+
+
+def of_champion(row: Mapping[str, Any], settings: FindConfig) -> Artifact:
+    """Return the file to dance of a video that the catalogue has: what was assessed of a file of
+    this machine, which may be another by now; of the web the best format."""
+    scored = _scored(row)
+    if row["source"] == folder.NAME:
+        return scored
+    return of_candidate(_candidate(row), scored, settings)
+
+
+def _candidate(row: Mapping[str, Any]) -> VideoCandidate:
+    """Return the video of a row of the catalogue."""
+    words = {name: row[name] or "" for name in ("title", "query")}
+    named = {name: row[name] for name in ("video_id", "url", "source")}
+    return VideoCandidate(**named, **words)
+
+
+def _scored(row: Mapping[str, Any]) -> Artifact:
+    """Return the file that was assessed."""
+    return Artifact(key=row["video_key"], sha256=row["video_sha256"])
+
+
+def _stored(candidate: VideoCandidate, scored: Artifact | None) -> Artifact | None:
+    """Return the largest file that was downloaded of a video, or the one that was assessed."""
+    return stored_video(Store.from_environment(), WebVideo.of(candidate)) or scored
 
 
 def nothing(found: SearchResult) -> str:

@@ -7,7 +7,7 @@ the others; the result names which failed and why.
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any
 
 from prefect import flow
@@ -20,18 +20,24 @@ from flows.find import (
     HUNTERS,
     in_good_quality,
     nothing,
-    of_candidate,
+    of_champion,
     run_id,
 )
 from flows.runtime.launch import launch
+from flows.search.refresh_notes import KIND, is_due, note
 from flows.search.search_artifacts import publish_search
-from flows.search.search_entries import REASON_LENGTH, Entry, reason_of, rows
+from flows.search.search_entries import REASON_LENGTH, reason_of, rows
 from flows.search.search_pipeline import search_and_rank
 from flows.video_pass.motion_stages import to_reference
 from robojackson.cli.options import yaml_text
 from robojackson.clips.web.untrusted_text import clean_text
-from robojackson.clips.web.video_candidate import VideoCandidate
-from robojackson.errors import BadConfiguration, NoPersonFound, RoboJacksonError, SearchFailed
+from robojackson.errors import (
+    BadConfiguration,
+    NoPersonFound,
+    RoboJacksonError,
+    SearchFailed,
+    StoreError,
+)
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import slug_of
@@ -42,12 +48,7 @@ from storage.leftovers import sweep
 from storage.store import Store
 from tasks.probe_video import SourceFile, probe_video
 
-KIND = "refresh"
-"""Beginning of the ids of its runs in the catalogue."""
-FOLDER = "refresh"
 CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
-SLACK = 0.1
-"""Share of the days between two searches that a nightly run may come early."""
 Facts = dict[str, Any]
 BOOK = "dances"
 """Where the dances are named: a file of `configs`."""
@@ -76,26 +77,29 @@ async def refresh(
         BadConfiguration: two dances of the book have the same letters and digits.
         SearchFailed: every dance failed; the message has the reasons.
     """
-    sweep(Store.from_environment(), work=False)
-    settings = asdict(load(FindConfig, config, overrides))
-    stages = [pipeline, pipeline_overrides or {}]
+    store, began = Store.from_environment(), datetime.now(UTC)
+    sweep(store, work=False)
+    load(FindConfig, config, overrides)  # before any dance
+    robot = describe_robot(load(PipelineConfig, pipeline, pipeline_overrides).robot).name
+    given = (config, overrides or {}, pipeline, pipeline_overrides or {})
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
-    picked = _require_distinct(load(DanceBook, book)).pick(dances)
-    due = [dance for dance in picked if dances is not None or _is_due(dance)]
-    for dance in due:
-        state = await refresh_dance(dance.name, asdict(dance), settings, *stages, return_state=True)
+    waiting: list[str] = []
+    for dance in _require_distinct(load(DanceBook, book)).pick(dances):
+        if dances is None and not is_due(store, dance, robot, began):
+            waiting.append(dance.name)
+            continue
+        state = await refresh_dance(dance.name, asdict(dance), *given, return_state=True)
         result = await state.aresult(raise_on_failure=False)
         if isinstance(result, BaseException):
             failed[dance.name] = reason_of(result)
         else:
             done[dance.name] = result
-            _note(dance, result)
-    candidate_catalogue.compact(Store.from_environment())
+            note(store, dance, robot, began, result)
+    candidate_catalogue.compact(store)
     await _log_summary(done, failed)
     if failed and not done:
         raise SearchFailed("; ".join(f"{name}: {reason}" for name, reason in failed.items()))
-    waiting = [dance.name for dance in picked if dance not in due]
     return {"dances": done, "failed": failed, "not_due": waiting}
 
 
@@ -115,16 +119,24 @@ def run(
 
 @flow(name="refresh-dance", flow_run_name="{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
 async def refresh_dance(
-    name: str, dance: Facts, config: Facts, pipeline: str, pipeline_overrides: Facts
+    name: str,
+    dance: Facts,
+    config: str,
+    overrides: Facts,
+    pipeline: str,
+    pipeline_overrides: Facts,
 ) -> Facts:
     """Refresh one dance, from its name to a reference motion.
+
+    Configurations are named, not given: what is given is shown on Prefect's pages, and they may
+    hold the password of a proxy.
 
     Raises:
         SearchFailed: the source does not answer, or has no new video and none was chosen before.
         NoPersonFound: no video may be danced; the message has the reasons.
     """
     entry = build(Dance, dance, "dance")
-    settings = build(FindConfig, config, "config")
+    settings = load(FindConfig, config, overrides)
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
     mine = (store, entry.name, KIND)  # assessments of `find` do not count here
@@ -136,25 +148,25 @@ async def refresh_dance(
     await publish_search(entry.name, listing, chosen)
     if chosen is None:
         raise NoPersonFound(nothing(found))
-    try:
-        made = motion(store, _video(found.chosen, reigning, settings), stages)
-    except RoboJacksonError as cause:
-        if not found.chosen:
+    video = in_good_quality(found.chosen, settings) if found.chosen else None
+    while True:
+        try:
+            made = motion(store, video or of_champion(chosen, settings), stages)
+            break
+        except StoreError:  # no fault of the video's
             raise
-        candidate_catalogue.append(store, [{**listing[0], **_failed(cause)}])
-        if reigning is None:
-            raise
-        get_run_logger().warning("%s: %s; the one before is danced", entry.name, cause)
-        chosen = reigning
-        made = motion(store, _video(None, reigning, settings), stages)
+        except RoboJacksonError as cause:
+            candidate_catalogue.append(store, [{**chosen, **_failed(cause)}])
+            before = candidate_catalogue.champion(*mine)
+            if before is None:
+                raise
+            get_run_logger().warning("%s: %s; the one before is danced", entry.name, cause)
+            chosen, video = before, None
     return {
         "run_id": found.run_id,
         "assessed": len(listing),
-        "is_new": chosen is not reigning,
-        "chosen": {
-            key: chosen[key]
-            for key in ("video_id", "url", "title", "score_per_second", "stability_score")
-        },
+        "is_new": video is not None,
+        "chosen": {key: chosen[key] for key in CHOSEN_COLUMNS},
         **made,
     }
 
@@ -178,22 +190,6 @@ def _failed(cause: RoboJacksonError) -> Facts:
     return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
 
 
-def _video(chosen: Entry | None, reigning: Facts | None, settings: FindConfig) -> Artifact:
-    """Return the file to dance: of the new choice, or of the video chosen before."""
-    if chosen:
-        return in_good_quality(chosen, settings)
-    assert reigning
-    candidate = VideoCandidate(
-        video_id=reigning["video_id"],
-        url=reigning["url"],
-        title=reigning["title"] or "",
-        query=reigning["query"] or "",
-        source=reigning["source"],
-    )
-    scored = Artifact(key=reigning["video_key"], sha256=reigning["video_sha256"])
-    return of_candidate(candidate, scored, settings)
-
-
 def _require_distinct(book: DanceBook) -> DanceBook:
     """Return the book, or raise if two dances would share a catalogue key."""
     by_slug: dict[str, str] = {}
@@ -204,26 +200,6 @@ def _require_distinct(book: DanceBook) -> DanceBook:
                 f"dances: {other!r} and {dance.name!r} have the same letters and digits; rename one"
             )
     return book
-
-
-def _is_due(dance: Dance) -> bool:
-    """Return whether it was last searched long enough ago."""
-    store, key = Store.from_environment(), _key(dance)
-    if not store.exists(key):
-        return True
-    last = datetime.fromisoformat(json.loads(store.read(key))["finished_at"])
-    return datetime.now(UTC) - last >= timedelta(days=dance.every_days * (1 - SLACK))
-
-
-def _note(dance: Dance, result: Facts) -> None:
-    """Store the result and its time."""
-    facts = {"finished_at": datetime.now(UTC).isoformat(), "dance": dance.name, **result}
-    text = json.dumps(facts, indent=1, default=str)
-    Store.from_environment().put(_key(dance), text.encode())
-
-
-def _key(dance: Dance) -> str:
-    return f"{FOLDER}/{slug_of(dance.name)}.json"
 
 
 async def _log_summary(done: dict[str, Facts], failed: dict[str, str]) -> None:

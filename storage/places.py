@@ -64,7 +64,10 @@ class Remote:
     def exists(self, key: str) -> bool:
         """Return whether there is such a file."""
         self._system.invalidate_cache()
-        return bool(self._system.isfile(self._path(key)))
+        try:  # `isfile` takes every failure for a no
+            return bool(self._system.info(self._path(key))["type"] == "file")
+        except FileNotFoundError:
+            return False
 
     def remove(self, key: str) -> None:
         """Remove a file."""

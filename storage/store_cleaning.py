@@ -21,7 +21,7 @@ USUAL: tuple[Kind, ...] = ("work", "unused")
 """Kinds that nothing is lost with but time."""
 IDLE = {"server", "clean", "doctor", "metrics", "catalogue", "robots", "deploy"}
 """Commands of ours that make no results."""
-FLOW = "prefect.flow_engine"
+FLOWS = {"prefect.engine", "prefect.flow_engine", "prefect.runner._workspace_supervisor"}
 """What a worker of Prefect starts for a run."""
 
 
@@ -102,7 +102,7 @@ def _content(path: Path) -> bytes:
 def _command(words: list[str]) -> str:
     """Return the command of a process of ours; empty for any other process."""
     for place, word in enumerate(words):
-        if word == FLOW:
+        if word in FLOWS:
             return "a run of a worker"
         if Path(word).name == "robojackson" or word == "robojackson.cli":
             following = next(iter(words[place + 1 :]), "")

@@ -8,7 +8,7 @@ import os
 import re
 from pathlib import Path
 
-from robojackson.errors import UnknownName
+from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline.app_folder import CONFIGS, app_folder
 
 SHIPPED = app_folder() / "configs"
@@ -40,8 +40,17 @@ def find(name_or_path: str | Path) -> Path:
 
 def folders() -> list[Path]:
     """Return where named configurations are looked for: the user's folder first, then the shipped
-    one."""
-    own = Path(os.environ.get(CONFIGS) or "configs").absolute()
+    one.
+
+    Raises:
+        BadConfiguration: the variable names no folder.
+    """
+    named = os.environ.get(CONFIGS)
+    own = Path(named or "configs").absolute()
+    if named and not own.is_dir():
+        raise BadConfiguration(
+            f"{CONFIGS} is {named!r}, and {own} is no folder; a worker needs an absolute path"
+        )
     return [own, SHIPPED] if own != SHIPPED and own.is_dir() else [SHIPPED]
 
 

@@ -231,11 +231,11 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     for name, stand_in in {
         "search_and_rank": search, "motion": motion, "publish_search": show,
         "in_good_quality": lambda *given: Artifact("new", "0" * 64),
-        "of_candidate": lambda *given: Artifact("old", "0" * 64),
+        "of_champion": lambda *given: Artifact("old", "0" * 64),
         "get_run_logger": lambda: logging.getLogger("refresh"),
     }.items():  # fmt: skip
         monkeypatch.setattr(nightly, name, stand_in)
-    given = ({"name": "APT", "query": "APT"}, {}, "smoke", {})
+    given = ({"name": "APT", "query": "APT"}, "finding", {}, "smoke", {})
     result = asyncio.run(nightly.refresh_dance.fn("APT", *given))
     assert (result["chosen"]["video_id"], result["is_new"], result["reference"]) == (
         "old",

@@ -1,5 +1,7 @@
-"""A folder of video files; each is its own candidate, wherever a copy of it stands."""
+"""A folder of video files; each is its own candidate, wherever a copy of it stands, and another one
+when its content is another."""
 
+import hashlib
 from datetime import datetime
 from pathlib import Path
 
@@ -28,5 +30,14 @@ def search(
 
 
 def _candidate(path: Path, query: str, now: datetime) -> VideoCandidate:
-    name = safe_name(path.stem, str(path))
+    name = safe_name(path.stem, f"{path} {_digest(path)}")
     return VideoCandidate(name, str(path), clean_text(path.name), query, NAME, retrieved_at=now)
+
+
+def _digest(path: Path) -> str:
+    """Return the sha256 of a file; nothing of one that cannot be read, as its download will say."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
