@@ -110,6 +110,24 @@ def test_without_a_net_the_video_that_was_chosen_last_is_danced(
 
 
 @pytest.mark.medium
+def test_a_steadier_choice_of_the_nightly_refresh_is_danced(
+    records: None, store_folder: Path, tmp_path: Path, short_clip: Path
+) -> None:
+    store = Store(store_folder)
+    kept = store.save("video", "clip.mp4", b"of the night")
+    facts = {"dance": "Hips", "run_id": "refresh-1", "source": "folder", "video_id": "v"}
+    facts |= {"url": str(tmp_path / "v.mp4"), "retrieved_at": NOW, "decided_at": NOW}
+    score = {"frames": 60, "detected": 60, "missing_joints": 0, "jitter": 0.0}
+    names = ("stability_score", "missing_joints_per_frame", "jitter_per_frame", "score_per_second")
+    score |= dict.fromkeys(names, 0.0)
+    chosen = {"decision": "chosen", "video_key": kept.key, "video_sha256": kept.sha256}
+    candidate_catalogue.append(store, [{**facts, **score, **chosen}])
+    with serving(short_clip.read_bytes()) as web:
+        listed = book(tmp_path, f"{web.url}/good/b.mp4")
+        assert files("Hips", near(tmp_path), listed) == {"hips.mp4": b"of the night"}
+
+
+@pytest.mark.medium
 def test_without_a_net_and_without_a_choice_the_search_has_failed(
     records: None, store_folder: Path, config: str
 ) -> None:

@@ -26,7 +26,13 @@ from flows.search.requests import check_refresh
 from flows.search.search_entries import Entry, SearchResult, rows
 from robojackson.clips.web.candidate_selection import Selection
 from robojackson.clips.web.video_candidate import VideoCandidate
-from robojackson.errors import BadConfiguration, SearchFailed, TrackTooShort, UnknownName
+from robojackson.errors import (
+    BadConfiguration,
+    SearchFailed,
+    StoreError,
+    TrackTooShort,
+    UnknownName,
+)
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from storage import candidate_catalogue
@@ -195,57 +201,86 @@ def test_every_dance_failing_is_a_failed_run(nights: Nights) -> None:
         nights.again(["Nowhere"])
 
 
-def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = Store(tmp_path)
-    kept, now = store.save("video", "clip.mp4", b"x"), datetime.now(UTC)
-    row = {
-        "dance": "APT",
-        "source": "site",
-        "url": "http://host/v",
-        "retrieved_at": datetime.now(UTC),
-    }
-    row |= {"title": "", "query": "", "video_key": kept.key, "video_sha256": kept.sha256}
-    old = {**row, "video_id": "old", "run_id": "refresh-1", "decided_at": now}
-    candidate_catalogue.append(store, [{**old, "decision": "chosen", "stability_score": 1.0}])
-    candidate = VideoCandidate(
-        "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
-    )
+@dataclass
+class Night:
+    """A refresh of APT over a catalogue in which `oldest` and `old` were chosen before `new`."""
 
-    def search(dance: Dance, *rest: object) -> SearchResult:
-        entry = Entry(candidate, "chosen", video=kept)
+    store: Store
+    monkeypatch: pytest.MonkeyPatch
+    faults: dict[str, Exception]
+
+    def __post_init__(self) -> None:
+        """Fill the catalogue and stand in for search and motion."""
+        kept = self.store.save("video", "clip.mp4", b"x")
+        for place, name in enumerate(("oldest", "old")):
+            row = {
+                "dance": "APT", "source": "site", "url": "http://host/v", "title": "", "query": "",
+                "video_key": kept.key, "video_sha256": kept.sha256, "video_id": name,
+                "run_id": f"refresh-{place}", "decision": "chosen", "stability_score": 1.0,
+                "retrieved_at": datetime.now(UTC), "decided_at": datetime.now(UTC),
+            }  # fmt: skip
+            candidate_catalogue.append(self.store, [row])
+        self.kept = kept
+        self.monkeypatch.setenv("ROBOJACKSON_STORE", str(self.store.root))
+        for name, stand_in in {
+            "search_and_rank": self.search, "motion": self.motion, "publish_search": self.show,
+            "in_good_quality": lambda *given: Artifact("new", "0" * 64),
+            "of_champion": lambda row, *given: Artifact(row["video_id"], "0" * 64),
+            "get_run_logger": lambda: logging.getLogger("refresh"),
+        }.items():  # fmt: skip
+            self.monkeypatch.setattr(nightly, name, stand_in)
+
+    def search(self, dance: Dance, *rest: object) -> SearchResult:
+        """Find one new video, which is the best."""
+        candidate = VideoCandidate(
+            "new", "http://host/new", "", "", "site", retrieved_at=datetime.now(UTC)
+        )
+        entry = Entry(candidate, "chosen", video=self.kept)
         made = SearchResult(dance, "refresh-2", (entry,), Selection((candidate,), ()))
-        candidate_catalogue.append(store, rows(made))
+        candidate_catalogue.append(self.store, rows(made))
         return made
 
-    def motion(store: Store, video: Artifact, settings: object) -> dict[str, Any]:
-        if video.key == "new":
-            raise TrackTooShort("1 frame")
+    def motion(self, store: Store, video: Artifact, settings: object) -> dict[str, Any]:
+        """Fail for the videos that cannot be danced."""
+        if video.key in self.faults:
+            raise self.faults[video.key]
         return {"reference": video.key}
 
-    async def show(*shown: object) -> None:
-        return None
+    async def show(self, *shown: object) -> None:
+        """Show nothing."""
 
-    monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path))
-    for name, stand_in in {
-        "search_and_rank": search, "motion": motion, "publish_search": show,
-        "in_good_quality": lambda *given: Artifact("new", "0" * 64),
-        "of_champion": lambda *given: Artifact("old", "0" * 64),
-        "get_run_logger": lambda: logging.getLogger("refresh"),
-    }.items():  # fmt: skip
-        monkeypatch.setattr(nightly, name, stand_in)
-    given = ({"name": "APT", "query": "APT"}, "finding", {}, "smoke", {})
-    result = asyncio.run(nightly.refresh_dance.fn("APT", *given))
-    assert (result["chosen"]["video_id"], result["is_new"], result["reference"]) == (
-        "old",
-        False,
-        "old",
-    )
-    reigning = candidate_catalogue.champion(store, "APT")
-    assert reigning is not None
-    assert reigning["video_id"] == "old"
-    assert ("site", "new") in candidate_catalogue.known(store, "APT")
+    def refreshed(self) -> dict[str, Any]:
+        """Return the result of the flow."""
+        given = ({"name": "APT", "query": "APT"}, "finding", {}, "smoke", {})
+        return asyncio.run(nightly.refresh_dance.fn("APT", *given))
+
+    @property
+    def champion(self) -> str | None:
+        """Return the id of the video that reigns."""
+        found = candidate_catalogue.champion(self.store, "APT")
+        return found and found["video_id"]
+
+
+@pytest.mark.parametrize(("impossible", "danced"), [(["new"], "old"), (["new", "old"], "oldest")])
+def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
+    impossible: list[str], danced: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults: dict[str, Exception] = {name: TrackTooShort("1 frame") for name in impossible}
+    night = Night(Store(tmp_path), monkeypatch, faults)
+    result = night.refreshed()
+    chosen = (result["chosen"]["video_id"], result["reference"], night.champion)
+    assert chosen == (danced, danced, danced)
+    assert not result["is_new"]
+    assert ("site", "new") in candidate_catalogue.known(night.store, "APT")
+
+
+def test_a_full_disk_is_no_fault_of_the_video(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    night = Night(Store(tmp_path), monkeypatch, {"new": StoreError("No space left on device")})
+    with pytest.raises(StoreError):
+        night.refreshed()
+    assert night.champion == "new", "the next night makes its motion"
 
 
 def test_dances_that_would_share_their_notes_are_refused() -> None:

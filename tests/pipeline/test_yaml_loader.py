@@ -184,6 +184,16 @@ def test_what_is_unknown_is_called_what_it_is(folder: str, kind: str) -> None:
         configuration_files.find(f"{folder}/nosuch")
 
 
+def test_a_folder_of_configurations_that_is_not_there_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A worker runs elsewhere: its relative path would mean the shipped ones."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", "mine")
+    with pytest.raises(BadConfiguration, match=r"'mine'.*needs an absolute path"):
+        configuration_files.find("base")
+
+
 def test_a_name_does_not_lead_out_of_the_package() -> None:
     with pytest.raises(UnknownName):
         configuration_files.find("../tests/configs/given")

@@ -89,6 +89,17 @@ def test_exists_only_what_was_put(store: Store) -> None:
     assert (store.exists("a"), store.exists("b")) == (True, False)
 
 
+def test_a_store_that_does_not_answer_is_no_absence(monkeypatch: pytest.MonkeyPatch) -> None:
+    store = Store("memory://dances")
+
+    def refuse(path: str) -> dict[str, str]:
+        raise PermissionError("403")
+
+    monkeypatch.setattr(store.place._system, "info", refuse)
+    with pytest.raises(StoreError, match="cannot look at memory://dances/a"):
+        store.exists("a")
+
+
 def test_an_unaltered_artifact_verifies(store: Store) -> None:
     artifact = store.put("a", b"x")
     assert store.verify(artifact) is artifact

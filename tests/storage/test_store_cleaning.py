@@ -11,7 +11,7 @@ import pytest
 from robojackson.errors import StoreError
 from robojackson.pipeline.folder_lock import locked
 from robojackson.rl.feedback import cached_feedback
-from storage import stage_records
+from storage import stage_records, store_cleaning
 from storage.artifact import Artifact
 from storage.store import Store
 from storage.store_cleaning import USUAL, plan, remove, users_of
@@ -173,6 +173,13 @@ def test_a_command_that_works_with_the_store_is_found(
         found = users_of(Path(store.root))
         process.communicate(b"\n")
     assert found == ([f"robojackson dance (process {process.pid})"] if used else [])
+
+
+@pytest.mark.parametrize(
+    "module", ["prefect.engine", "prefect.flow_engine", "prefect.runner._workspace_supervisor"]
+)
+def test_a_run_of_a_worker_is_a_user(module: str) -> None:
+    assert store_cleaning._command([sys.executable, "-m", module]) == "a run of a worker"
 
 
 def test_a_store_without_users_has_none(store: Store) -> None:

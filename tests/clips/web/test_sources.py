@@ -38,6 +38,14 @@ def test_a_name_in_two_folders_is_two_videos(tmp_path: Path) -> None:
     assert len(keys) == 2
 
 
+def test_a_file_that_is_replaced_is_another_video(tmp_path: Path) -> None:
+    keys = set()
+    for content in (b"first", b"again", b"again"):
+        (tmp_path / "practice.mp4").write_bytes(content)
+        keys |= {c.key for c in source("folder").search("", str(tmp_path), 9, WEB, NOW)}
+    assert len(keys) == 2
+
+
 def test_a_folder_that_is_not_there_is_a_failed_search(tmp_path: Path) -> None:
     with pytest.raises(SearchFailed, match="no such file or folder"):
         source("folder").search(str(tmp_path / "gone"), "", 10, WEB, NOW)
