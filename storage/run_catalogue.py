@@ -9,6 +9,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from robojackson.config import config_dataclass
 from robojackson.errors import BadTable
+from robojackson.files.json_types import to_json_types
 from storage.artifact import Artifact
 from storage.store import Store
 
@@ -42,7 +43,8 @@ class Run:
 
 def record(store: Store, run: Run) -> Artifact:
     """Record a run, replacing its earlier record."""
-    text = json.dumps(asdict(run), default=str, indent=1, sort_keys=True)
+    facts = to_json_types(asdict(run))
+    text = json.dumps(facts, default=str, indent=1, sort_keys=True, allow_nan=False)
     return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robojackson.files import tables
+from robojackson.files.json_types import to_json_types
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
@@ -79,7 +80,7 @@ def _saved(
 ) -> dict[str, Artifact]:
     """Return the artifacts of an evaluation; `common` are the columns that all its rows share."""
     rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **row} for row in verdict.rows])
-    summary = json.dumps(verdict.summary, indent=1).encode()
+    summary = json.dumps(to_json_types(verdict.summary), indent=1, allow_nan=False).encode()
     rollout, name = Rollout(dt, verdict.rollout_qpos), f"{prefix}rollout.parquet"
     return {
         "evaluations": store.save(stage_name, f"{prefix}evaluations.parquet", rows),

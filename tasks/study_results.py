@@ -96,9 +96,8 @@ def of_baselines(ask: RunQuery, study: Study) -> Baselines:
 
 def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[str]:
     """Return the moves whose rollouts are too short: bodies that do not dance succeed as well."""
-    sql = (
-        "SELECT move, max(survived_s) AS longest FROM evaluations WHERE study = $study GROUP BY ALL"
-    )
+    length = "max(survived_s / clip_fraction) FILTER (clip_fraction > 0)"  # whoever falls early
+    sql = f"SELECT move, {length} AS longest FROM evaluations WHERE study = $study GROUP BY ALL"
     longest = {row["move"]: row["longest"] for row in ask(sql, {"study": study.name})}
     easy = {
         move
@@ -109,9 +108,8 @@ def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[s
             if policy not in VARIANTS
         )
     }
-    return [
-        m for m in study.moves if m in longest and (m in easy or longest[m] < verdict.SHORTEST_S)
-    ]
+    short = {m for m, seconds in longest.items() if (seconds or 0.0) < verdict.SHORTEST_S}
+    return [move for move in study.moves if move in longest and move in easy | short]
 
 
 def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures:

@@ -41,7 +41,7 @@ from tasks.study_results import (
 )
 
 FOLDER = "studies"
-TEMPLATES = ("study.html", "page.css")
+TEMPLATES = ("study.html", "page.css", "figures.html")
 LEAST_STEPS = 10_000
 """Control steps of a training below which nothing is learnt."""
 PRIMARY = "return_own"

@@ -171,7 +171,7 @@ def _motion(
         name, found = f"dance {number + 1}", dance
     else:
         path = Path(dance)
-        name = path.parent.name if path.stem == "smpl" else motion_name(path)
+        name = path.absolute().parent.name if path.stem == "smpl" else motion_name(path)
         is_video = path.suffix.lower() in SUFFIXES
         found = recover_motion(path) if is_video else read_motion(path)
     if isinstance(found, SmplSequence):

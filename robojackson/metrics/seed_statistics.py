@@ -15,6 +15,8 @@ from scipy import stats
 
 LEVEL = 0.95
 RESAMPLES = 9_999
+MOST_EXACT = 18
+"""Pairs up to which all sign flips are looked at."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +81,17 @@ def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Ge
     p = np.nan
     if len(first) > 1:
         p = stats.permutation_test(
-            (first - second,), np.mean, permutation_type="samples", n_resamples=RESAMPLES, rng=rng
-        ).pvalue
+            (first - second,), np.mean, permutation_type="samples", n_resamples=_flips(len(first)),
+            rng=rng,
+        ).pvalue  # fmt: skip
     difference = estimate(list(first - second), rng)
-    smallest = 2.0 ** (1 - len(first)) if len(first) else np.nan
+    smallest = max(2.0 ** (1 - len(first)), 2.0 / _flips(len(first))) if len(first) else np.nan
     return Effect(difference, float(p), smallest, probability_of_improvement(first, second))
+
+
+def _flips(pairs: int) -> int:
+    """Return the number of sign flips of a test: all of them up to `MOST_EXACT` pairs."""
+    return max(RESAMPLES, 2 ** min(pairs, MOST_EXACT))
 
 
 def probability_of_improvement(

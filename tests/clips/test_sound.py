@@ -76,6 +76,13 @@ def test_sound_at_its_own_tempo_is_unchanged() -> None:
     assert np.abs(same[: len(samples)] - samples[: len(same)]).max() < 1e-6
 
 
+def test_a_dance_that_ends_standing_ends_in_silence() -> None:
+    tone = np.repeat(np.sin(2 * np.pi * 440 * np.arange(2 * RATE) / RATE)[:, None], 2, 1)
+    heard = warped(tone, np.minimum(np.arange(0, 5.0, HOP / RATE), 1.9))
+    assert np.abs(heard[round(2.1 * RATE) :]).max() == 0.0
+    assert np.abs(heard[: round(1.5 * RATE)]).max() > 0.5
+
+
 def test_sound_and_picture_of_a_written_film_are_in_step(tmp_path: Path) -> None:
     sound = Sound(clicks(4.0))
     pictures = [np.full((64, 64, 3), 10, np.uint8)] * (4 * FPS)

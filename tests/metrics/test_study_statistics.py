@@ -43,6 +43,12 @@ def test_three_pairs_cannot_give_a_smaller_p_than_a_quarter() -> None:
     assert found.p == pytest.approx(0.25) == found.smallest_p
 
 
+def test_the_p_of_many_pairs_is_as_small_as_it_can_be() -> None:
+    pairs = 14
+    found = seed_statistics.effect(list(range(1, pairs + 1)), [0.0] * pairs, RNG(0))
+    assert found.p == pytest.approx(2.0 ** (1 - pairs)) == found.smallest_p
+
+
 def test_samples_that_are_no_pairs_are_refused() -> None:
     with pytest.raises(ValueError, match="2 treated and 1 control"):
         seed_statistics.effect([1.0, 2.0], [1.0], RNG(0))

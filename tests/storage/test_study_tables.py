@@ -9,6 +9,7 @@ import pytest
 from robojackson.errors import BadTable
 from robojackson.files import tables
 from robojackson.pipeline.table_schemas import EPISODE_RECORD, EVALUATION_RECORD
+from robojackson.rl.config.evaluate_config import VARIANTS
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
@@ -119,6 +120,7 @@ def test_a_line_a_cell_evaluates_nothing_that_is_too_short(
     rows = [
         {**same, **own, "survived_s": survived_s},
         {**same, **own, "policy": "statue", "strict_success": statue, "survived_s": survived_s},
+        *({**same, **own, "policy": name, "survived_s": survived_s} for name in VARIANTS),
     ]
     encoded = tables.encode_rows(EVALUATION_RECORD, rows)
     kept = {"evaluations": store.save("stage", "evaluations.parquet", encoded)}

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks import write_study_page
+from tasks.study_results import too_short_moves
 from tasks.write_study_page import report
 
 pytestmark = pytest.mark.xdist_group("study_page")
@@ -234,3 +236,16 @@ def test_the_page_is_drawn_again_only_when_the_rows_change(
 def test_a_key_of_a_move_that_is_no_part_of_its_motion_is_refused() -> None:
     with pytest.raises(ValidationError, match=r"overrides\.evaluate\.seconds: is no part"):
         Move(clip="clips/walk.mp4", overrides={"evaluate.seconds": 3})
+
+
+def test_robots_that_fall_early_do_not_make_a_move_too_short(tmp_path: Path) -> None:
+    store, study = Store(tmp_path), Study(name="known", moves=("walk",), setups=("scratch",))
+    place = study_tables.Place("known", "walk", "scratch", 0, "r")
+    names = {"run_id": "r", "move": "walk", "setup": "scratch", "seed": 0}
+    for share, short in ((0.1, []), (1.0, ["walk"])):
+        row = {**rollout(names, "trained", 1.0), "success": 0.0, "clip_fraction": share}
+        encoded = tables.encode_rows(EVALUATION_RECORD, [row])
+        none = store.save("t", "e.parquet", tables.encode_rows(EPISODE_RECORD, []))
+        made = {"evaluations": store.save("t", "v.parquet", encoded), "episodes": none}
+        study_tables.write(store, place, made)
+        assert too_short_moves(partial(study_tables.query, store), study, {}) == short

@@ -140,7 +140,7 @@
   };
   node.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || ['SELECT', 'INPUT'].includes(event.target.tagName)) return;
-    if (event.target.tagName === 'BUTTON' && event.key === ' ') return;
+    if (['BUTTON', 'SUMMARY'].includes(event.target.tagName) && event.key === ' ') return;
     const act = keys[event.key];
     if (act) { event.preventDefault(); act(); }
   });

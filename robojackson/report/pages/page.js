@@ -111,7 +111,7 @@
   };
   node.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === 'SELECT') return;
-    if (event.target.tagName === 'BUTTON' && event.key === ' ') return;
+    if (['BUTTON', 'SUMMARY'].includes(event.target.tagName) && event.key === ' ') return;
     const act = keys[event.key];
     if (act) { event.preventDefault(); act(); }
   });

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robojackson.clips.sound import music_beats, read_sound, require_sound
 from robojackson.metrics.beat_alignment import alignment, half_a_beat, motion_beats
@@ -48,13 +48,33 @@ def music_beats_shown(
     return result
 
 
+def pictures_danced(reference: ReferenceMotion, fps: float, count: int) -> Bool[np.ndarray, " T"]:
+    """Return in which pictures the clip goes on: not in the stands and steps before and after it,
+    which have no music."""
+    times = clip_times(reference, np.arange(count + 1) / fps, goes_on=True)
+    result: np.ndarray = np.diff(times) > 0
+    return result
+
+
 def beat_report(
-    music: Float[np.ndarray, " B"], motions: dict[str, Float[np.ndarray, "T K 3"]], fps: float
+    music: Float[np.ndarray, " B"],
+    motions: dict[str, Float[np.ndarray, "T K 3"]],
+    fps: float,
+    danced: Bool[np.ndarray, " T"],
 ) -> Report:
-    """Return beats and figures of the motions, and of the last of them half a beat later."""
-    beats = {name: motion_beats(points, fps) for name, points in motions.items()}
+    """Return beats and figures of the motions, and of the last of them half a beat later.
+
+    Args:
+        danced: In which pictures the clip goes on; beats of others do not count.
+    """
+
+    def counted(times: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        pictures = np.round(fps * times).astype(int)
+        return times[(pictures < len(danced)) & danced[np.minimum(pictures, len(danced) - 1)]]
+
+    beats = {name: counted(motion_beats(points, fps)) for name, points in motions.items()}
     last = list(beats)[-1]
-    compared = {**beats, CONTROL: beats[last] + half_a_beat(music)}
+    compared = {**beats, CONTROL: counted(beats[last] + half_a_beat(music))}
     return {
         "music": music.round(3).tolist(),
         "motions": {name: times.round(3).tolist() for name, times in beats.items()},

@@ -11,6 +11,7 @@ from itertools import groupby
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robojackson.metrics.rollout_score import heading_frame
 from robojackson.mocap.reprojection import weak_frames
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -19,11 +20,12 @@ from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
 from robojackson.report.web.pane_camera import followed, followed_beside
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
+from robojackson.robot.names import PELVIS
 
 FAINT = 0.5
 """Mean confidence of the keypoints below which a stretch is marked."""
-FAR_M = 0.15
-"""Mean site error above which a stretch is marked, metres: half the limit of strict success."""
+FAR = 0.5
+"""Mean site error above which a stretch is marked, of the limit of strict success."""
 CONTACT_CLASSES = {1: "on", 2: "slide"}
 LEAST_SPAN = 2
 """Smallest length of a marked stretch, pictures, so that it is visible."""
@@ -60,8 +62,8 @@ class Player:
         data: Shapes, motions and curves in JSON's types.
         bands: Rows of the timeline.
         when: Times of the pictures.
-        error_m: Mean site error of the rollout at every picture, by name of the site; empty without
-            a rollout.
+        error_m: Distance of each site from the reference's at every picture, in the frame of pelvis
+            and heading, by name; empty without a rollout.
         points: Keypoints of dancer, reference and robot at every picture, metres.
     """
 
@@ -112,7 +114,12 @@ def player(
         danced = np.asarray(rollout_qpos, float)[when.rollout]
         own_poses, own_sites = body_poses(robot.model, danced)
         own_sites = own_sites[:, robot.keypoint_sites]
-        apart = np.linalg.norm(own_sites - sites, axis=-1)
+        pelvis = robot.keypoint_names.index(PELVIS)
+        own, there = (
+            heading_frame(points_w, qpos[:, 3:7], pelvis)
+            for points_w, qpos in ((own_sites, danced), (sites, target))
+        )
+        apart = np.linalg.norm(own - there, axis=-1)
         moved["robot"] = own_sites
         errors = dict(zip(robot.keypoint_names, apart.T, strict=True))
         camera = followed_beside(own_sites, danced[:, :3], fps, seen)
@@ -121,7 +128,8 @@ def player(
         data["error"] = packed(1000 * apart.mean(1))
         data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
     bands = _contact_bands(sequence, reference, when)
-    bands.append(Band("look here", attention(sequence, reference, when, errors, track)))
+    far_m = FAR * robot.description.strict.sites
+    bands.append(Band("look here", attention(sequence, reference, when, errors, track, far_m)))
     return Player(data, [band for band in bands if band.spans], when, errors, moved)
 
 
@@ -165,8 +173,13 @@ def attention(
     when: Timeline,
     errors: dict[str, Float[np.ndarray, " N"]],
     track: LandmarkTrack,
+    far_m: float,
 ) -> list[Span]:
-    """Return the bad stretches, by cause."""
+    """Return the bad stretches, by cause.
+
+    Args:
+        far_m: Mean site error above which a robot is off the dance, metres.
+    """
     frames = np.minimum(when.frame, len(sequence) - 1)
     marks: dict[str, Bool[np.ndarray, " N"]] = {
         "body filled in": ~np.asarray(sequence.valid)[frames],
@@ -177,7 +190,7 @@ def attention(
         marks["beyond the robot"] = np.asarray(reference.certificate.slack)[when.step] > 1
     if errors:
         apart = np.mean(list(errors.values()), 0)
-        marks["robot off the dance"] = (apart > FAR_M) & ~when.ended
+        marks["robot off the dance"] = (apart > far_m) & ~when.ended
         marks["robot has fallen or ended"] = when.ended
     found = []
     for title, bad in marks.items():

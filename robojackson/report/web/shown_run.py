@@ -18,7 +18,7 @@ from robojackson.report.video.canvas import Picture
 from robojackson.report.video.film import VideoConfig
 from robojackson.report.video.soundtrack import soundtrack
 from robojackson.report.video.source_film import source_film
-from robojackson.report.web.beats import beat_bands, beat_report, music_beats_shown
+from robojackson.report.web.beats import beat_bands, beat_report, music_beats_shown, pictures_danced
 from robojackson.report.web.player_data import Player, player
 from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.robot.model import Robot
@@ -92,7 +92,9 @@ def _beats(
     except MissingDependency as missing:
         log.warning("%s", missing)
         return None
-    return beat_report(music, shown.points, float(config.fps)) if len(music) else None
+    fps = float(config.fps)
+    danced = pictures_danced(run.reference, fps, len(shown.when))
+    return beat_report(music, shown.points, fps, danced) if len(music) else None
 
 
 def thumbnail(clip: Path) -> str:

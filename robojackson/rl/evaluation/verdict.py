@@ -1,5 +1,6 @@
 """The verdict of an evaluation: a kind with figures, from which the sentence is made."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -65,12 +66,12 @@ class Verdict:
         if self.kind == "dances":
             return (
                 f"The robot dances: it follows from {self.strict_success:.0%} of the starts to the "
-                f"end, skill {self.skill:.2f} of 1."
+                f"end{self._skilled()}."
             )
         if self.kind == "partly":
             return (
                 f"The robot dances from {self.strict_success:.0%} of the starts and falls or "
-                f"strays from the others, skill {self.skill:.2f} of 1."
+                f"strays from the others{self._skilled()}."
             )
         if self.kind == "falls":
             return f"The robot falls after {self.survived_s:.1f} s, no better than {other}."
@@ -78,6 +79,10 @@ class Verdict:
             f"The robot does not dance yet: it stays up for {self.survived_s:.1f} of "
             f"{self.seconds:.1f} s, {other} for {self.baseline_s:.1f} s."
         )
+
+    def _skilled(self) -> str:
+        """Return the skill, which a motion that hardly moves has not, as the end of a sentence."""
+        return f", skill {self.skill:.2f} of 1" if math.isfinite(self.skill) else ""
 
     def as_facts(self) -> dict[str, Any]:
         """Return kind and sentence for evaluation.json."""

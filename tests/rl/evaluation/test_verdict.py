@@ -46,3 +46,8 @@ def test_no_success_is_reported_of_what_is_too_short() -> None:
     left = without_short_figures({"success": 1.0, "skill": 0.9, "survived_s": 0.5})
     assert left == {"success": None, "skill": None, "survived_s": 0.5}
     assert set(left) - {"survived_s"} <= set(NEEDS_FULL_LENGTH)
+
+
+def test_a_motion_without_a_skill_is_reported_without_one() -> None:
+    sentence = verdict_on(figures(10, 1.0, float("nan")), STATUE, 10.0).sentence
+    assert sentence == "The robot dances: it follows from 100% of the starts to the end."

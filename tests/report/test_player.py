@@ -1,0 +1,27 @@
+"""The marks and curves of a page's player."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.web.player_data import player
+from tests.fixtures.robots import stock
+
+
+def test_a_robot_that_drifts_over_the_floor_does_not_leave_the_dance(
+    track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion
+) -> None:
+    """Errors and marks are in the frame of pelvis and heading, as strict success is."""
+    robot = stock()
+    drifted, bent = (np.array(reference.qpos, float) for _ in range(2))
+    drifted[:, 0] += 1.0
+    bent[:, 7:] += 1.5
+    motion = replace(reference, certificate=None)
+    for qpos, is_off in ((drifted, False), (bent, True)):
+        shown = player(track, sequence, motion, qpos, robot, 30.0, 5.0)
+        titles = {span.title for band in shown.bands for span in band.spans}
+        assert ("robot off the dance" in titles) == is_off
+        assert (max(error.max() for error in shown.error_m.values()) > 0.1) == is_off
