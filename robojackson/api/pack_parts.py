@@ -145,7 +145,7 @@ def write_pack(
         "weakest_case": weakest and weakest["case"],
         "weakest_strict_success": weakest and _strict_of(weakest),
         "licences": together(ingredients),
-        "unknown_licences": sorted({one.kind for one in ingredients if one.licence == "unknown"}),
+        "unknown_licences": sorted({one.kind for one in ingredients if not one.is_known}),
     }
 
 

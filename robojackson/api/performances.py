@@ -4,6 +4,7 @@ import json
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,8 @@ from robojackson.rl.trackers.tracker import Tracker
 from robojackson.robot.model import Robot
 
 Dance = FilePath | SmplSequence | ReferenceMotion
+ONE = (str, PathLike, SmplSequence, ReferenceMotion)
+"""Types of a single dance."""
 SEARCHES = (
     "%s computes gains for all %.0f s of the programme first: minutes of a processor, and it may "
     "find no path for so long a motion; a network needs no search (robojackson trackers lists them)"
@@ -83,7 +86,7 @@ class Performance:
 
 
 def perform(
-    dances: Sequence[Dance],
+    dances: Dance | Sequence[Dance],
     robot: RobotLike | None = None,
     *,
     tracker: str | Tracker | None = None,
@@ -95,7 +98,8 @@ def perform(
     """Let a robot stand, go into the first dance, dance all of them, and stand again.
 
     Args:
-        dances: Videos, motions of people, or reference motions of the robot; or files of them.
+        dances: Videos, motions of people, or reference motions of the robot; or files of them; one,
+            or several in their order.
         robot: Name, YAML file, or what `load_robot` returned; the first tracker's when None.
         tracker: Who dances: a name of configs/trackers or a tracker; the robot's first one that is
             here when None.
@@ -115,7 +119,8 @@ def perform(
     machine = load_robot(usual_robot() if robot is None else robot)
     solving = retarget or RetargetConfig()
     who = _tracker(tracker, machine)
-    motions = [_motion(dance, i, machine, solving) for i, dance in enumerate(dances)]
+    several = [dances] if isinstance(dances, ONE) else dances
+    motions = [_motion(dance, i, machine, solving) for i, dance in enumerate(several)]
     planned = plan(motions, machine, programme or ProgrammeConfig(), solving)
     how = config or PerformanceConfig()
     if who.description.network == "regulator":

@@ -58,7 +58,7 @@ def train_policy(
     robot: RobotLike | None = None,
     *,
     config: TrainConfig | None = None,
-    setup: str | None = None,
+    setup: FilePath | None = None,
     steps: int | None = None,
     minutes: float | None = None,
     seed: int | None = None,
@@ -115,7 +115,7 @@ def train_policy(
         return _trained(motion, machine, settings, folder, labels, heard, report)
 
 
-def _labels(config: TrainConfig, move: str, setup: str | None, run_id: str) -> dict[str, Any]:
+def _labels(config: TrainConfig, move: str, setup: FilePath | None, run_id: str) -> dict[str, Any]:
     """Return the labels of the run's rows."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
     usual = OF_DANCER if config.start == "dancer" else usual
@@ -153,7 +153,7 @@ def _trained(
 
 def _configured(
     config: TrainConfig | None,
-    setup: str | None,
+    setup: FilePath | None,
     steps: int | None,
     minutes: float | None,
     seed: int | None,
@@ -173,10 +173,12 @@ def _configured(
     return found if found.has_budget else replace(found, minutes=DEFAULT_MINUTES)
 
 
-def setup_file(name: str | None) -> str | None:
+def setup_file(name: FilePath | None) -> str | None:
     """Return the name for the loader: a bare name is one of configs/setups."""
-    bare = name is not None and not {"/", "."} & set(name)
-    return f"setups/{name}" if bare else name
+    if name is None:
+        return None
+    text = str(name)
+    return text if {"/", "."} & set(text) else f"setups/{text}"
 
 
 def _named(

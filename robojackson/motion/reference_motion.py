@@ -96,7 +96,7 @@ class ReferenceMotion(TableFile):
         body_pos_w: Origins of the bodies, metres, world.
         keypoints_w: The robot's own keypoint sites (hands and head among them), metres, world.
         contact: State of the robot's contact points: 0 air, 1 planted, 2 sliding.
-        torque_ratio: |torque| / limit a mj_joint with an actuator, from inverse dynamics.
+        torque_ratio: |torque| / limit a hinge, from inverse dynamics; 0 where nothing drives it.
         source_time_s: Time in the source clip that each step shows, seconds.
         joint_names, body_names, keypoint_names, contact_names: What the columns are.
         scorecard: Figures of the quality of the motion.
@@ -117,7 +117,7 @@ class ReferenceMotion(TableFile):
     body_pos_w: Float[np.ndarray, "S nbody 3"]
     keypoints_w: Float[np.ndarray, "S K 3"]
     contact: Int[np.ndarray, "S C"]
-    torque_ratio: Float[np.ndarray, "S nu"]
+    torque_ratio: Float[np.ndarray, "S J"]
     source_time_s: Float[np.ndarray, " S"]
     joint_names: tuple[str, ...]
     body_names: tuple[str, ...]
@@ -144,6 +144,8 @@ class ReferenceMotion(TableFile):
         columns = numbered("step", len(self), self.dt)
         columns |= {name: np.asarray(getattr(self, name)) for name in (*ARRAYS, "source_time_s")}
         facts = {name: getattr(self, name) for name in REFERENCE_MOTION.metadata}
+        card = self.scorecard.items()
+        facts["scorecard"] = {name: x if np.isfinite(x) else None for name, x in card}
         if self.certificate is not None:
             facts["certificate"] = asdict(self.certificate)
         if self.robot_file:
@@ -165,7 +167,7 @@ class ReferenceMotion(TableFile):
             cyclic=bool(facts["cyclic"]),
             cycle_offset=np.array(facts["cycle_offset"], float),
             source_time_s=columns["source_time_s"],
-            scorecard=dict(facts["scorecard"]),
+            scorecard={k: np.nan if v is None else v for k, v in facts["scorecard"].items()},
             certificate=_certificate(facts),
             robot_file=str(facts.get("robot_file", "")),
             **(arrays | {name: tuple(facts[name]) for name in NAMES}),

@@ -49,7 +49,8 @@ def score(
     card["seam_speed_rad_s"] = (
         0.0 if cycle_offset is None else seam_speed(motion.qpos, motion.dt, cycle_offset)
     )
-    card["torque_ratio_p95"] = float(np.quantile(motion.torque_ratio, 0.95))
+    driven = motion.torque_ratio[:, robot.actuated]
+    card["torque_ratio_p95"] = float(np.quantile(driven, 0.95)) if driven.size else 0.0
     card["torque_over_share"] = float((motion.torque_ratio > 1).any(axis=1).mean())
     card |= _feasibility(motion, robot)
     card["passed"] = float(not failures(card))

@@ -30,6 +30,8 @@ SIDEWAYS = 0.9
 """Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
 """Of a control step; training takes five steps of the model by default."""
+LONGEST_NAME = 64
+"""Characters of a robot's name."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -140,7 +142,12 @@ def name_of_model(path: Path) -> str:
     text = path.read_text(errors="replace") if path.is_file() else ""
     named = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
     name = re.sub(r"\W+", "_", named.group(1) if named else path.stem).strip("_").lower()
-    return name or "robot"
+    return robot_name(name)
+
+
+def robot_name(text: str) -> str:
+    """Return a text as a name that a description may have."""
+    return re.sub(r"[^\w.-]+", "_", text).strip("_.-")[:LONGEST_NAME] or "robot"
 
 
 def _place(path: Path, folder: Path) -> str:

@@ -16,6 +16,7 @@ LEG_WORDS = {
     "knee": ("knee", "shin", "calf", "shank", "tibia", "lowerleg"),
     "ankle": ("ankle", "foot", "sole", "toe"),
 }
+TOE = "toe"
 ARM_WORDS = {
     "shoulder": ("shoulder", "upperarm", "clavicle", "humerus", "scapula"),
     "elbow": ("elbow", "forearm", "lowerarm"),
@@ -163,10 +164,26 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
         name = next(kinds, None)
         if name is not None:
             parts[name].append(hinge)
-    first, second, _ = parts
+    first, second, third = parts
+    parts[third] = _without_toes(model, parts[third])
     if parts[first] and parts[second]:
         return Limb(bodies, {k: tuple(v) for k, v in parts.items()}, True)
     return Limb(bodies, _by_distance(skeleton, bodies, hinges, tuple(words)), False)
+
+
+def _without_toes(model: mujoco.MjModel, hinges: list[int]) -> list[int]:
+    """Return the hinges at the end of a limb without those of toes, if there are others."""
+    kept = []
+    for hinge in hinges:
+        own = [model.joint(hinge).name]
+        called = (
+            own
+            if names_any(own, LEG_WORDS["ankle"])
+            else own + [model.body(model.jnt_bodyid[hinge]).name]
+        )
+        if not names_any(called, (TOE,)):
+            kept.append(hinge)
+    return kept or hinges
 
 
 def _by_distance(

@@ -43,6 +43,7 @@ def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
             hinge.armature = inertia
         if hinge.name not in limited:
             continue
+        _bound(hinge, float(limit) * description.gear_scale)
         if hinge.name in motors:
             _limit(motors[hinge.name], float(limit))
         else:
@@ -78,11 +79,19 @@ def _motors(spec: mujoco.MjSpec) -> dict[str, list[mujoco.MjsActuator]]:
     return found
 
 
+def _bound(hinge: mujoco.MjsJoint, limit: float) -> None:
+    """Let the bound that an MJCF gives to the torque of a hinge be a limit, Nm."""
+    if np.any(hinge.actfrcrange) and not np.isclose(np.abs(hinge.actfrcrange).max(), limit):
+        hinge.actfrcrange = [-limit, limit]
+
+
 def _limit(motors: list[mujoco.MjsActuator], limit: float) -> None:
     """Give the motors of one joint the control ranges with which they give a torque at most, Nm."""
     force = [abs(each.gear[0] * each.gainprm[0]) for each in motors]
     torque = sum(f * np.abs(each.ctrlrange).max() for f, each in zip(force, motors, strict=True))
     for each, own in zip(motors, force, strict=True):
+        if np.any(each.forcerange) and own and not np.isclose(torque, limit):
+            each.forcelimited = False
         if torque > 0 and not np.isclose(torque, limit):
             each.ctrlrange = np.asarray(each.ctrlrange) * (limit / torque)
         elif torque == 0 and own > 0:  # no range in the MJCF

@@ -197,3 +197,21 @@ def test_rotations_twice_about_one_axis_are_refused(turns: str) -> None:
     )
     with pytest.raises(BadTable, match=r"LeftUpLeg: rotations about [ZX], [ZX]"):
         bvh_tree.parse(text.encode())
+
+
+def test_a_dancer_below_a_root_that_stands_still_travels() -> None:
+    """MotionBuilder puts a `Reference` above the hips, which have the position channels."""
+    head, tail = stick().decode().split("ROOT Hips\n{", 1)
+    tree, motion = tail.split("MOTION", 1)
+    *words, first, second, third = motion.strip().split("\n")
+    rows = [f"{10 * k} {row.split(' ', 1)[1]}" for k, row in enumerate((first, second, third))]
+    still = "ROOT Reference\n{\n OFFSET 0 0 0\n CHANNELS 3 Zrotation Yrotation Xrotation\n JOINT"
+    expected, found = (
+        bvh_tree.parse(
+            f"{head}{above} Hips\n{{{tree}{close}\nMOTION\n".encode()
+            + "\n".join([*words, *(zeros + row for row in rows)]).encode()
+        )
+        for above, close, zeros in (("ROOT", "", ""), (still, "}", "0 0 0 "))
+    )
+    np.testing.assert_allclose(found.positions()[:, 1:], expected.positions(), atol=1e-9)
+    assert np.ptp(found.positions()[:, 1], axis=0).max() == 20.0

@@ -14,6 +14,7 @@ from robojackson.motion.smpl_sequence import PLANTED
 from robojackson.retarget.paper_mapping import mapped
 from robojackson.retarget.retarget_config import RepairConfig, RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
+from robojackson.rl.sim.motors import Motors
 from robojackson.robot.actuation import torque_limits
 from robojackson.robot.mjcf import model_sha256
 from robojackson.robot.model import Robot, load_robot
@@ -128,6 +129,36 @@ def test_the_walk_keeps_all_hard_bars(motion: ReferenceMotion):
 
 
 @pytest.mark.medium
+def test_a_motion_for_hinges_without_motors_is_read_again(
+    motion: ReferenceMotion, small: Robot, tmp_path: Path
+):
+    """And one whose score card has a figure that nothing is known of."""
+    assert not small.actuated.all()
+    assert not motion.torque_ratio[:, ~small.actuated].any()
+    card = {**motion.scorecard, "velocity_score": float("nan")}
+    again = ReferenceMotion.load(replace(motion, scorecard=card).save(tmp_path / "r.parquet"))
+    np.testing.assert_array_equal(again.torque_ratio, np.float32(motion.torque_ratio))
+    assert np.isnan(again.scorecard.pop("velocity_score"))
+    card.pop("velocity_score")
+    assert dict(again.scorecard) == pytest.approx(card)
+
+
+@pytest.mark.parametrize(
+    ("changes", "limit"),
+    [({}, 30.0), ({"torque_limits": {"waist": 80.0}}, 80.0), ({"gear_scale": 3.0}, 30.0)],
+)
+def test_the_waist_gives_what_is_certified(description, changes: dict[str, object], limit: float):
+    robot = load_robot(replace(description, **changes))
+    motors, waist = Motors.of(robot.model), robot.joint_names.index("waist")
+    (own,) = np.flatnonzero(motors.hinge == waist)
+    assert robot.torque_limit[waist] == pytest.approx(limit)
+    assert motors.limit[own] == pytest.approx(limit)
+    data = mujoco.MjData(robot.model)
+    data.ctrl[own] = 100 * motors.limit[own] / motors.gear[own]
+    mujoco.mj_forward(robot.model, data)
+    assert data.qfrc_actuator[6:][waist] == pytest.approx(limit)
+
+
 def test_the_walk_is_followed_to_a_tenth_of_the_leg(motion: ReferenceMotion):
     assert motion.scorecard["keypoint_mm"] < 55
     assert motion.scorecard["planted_share"] > 0.5

@@ -4,10 +4,12 @@ import json
 import re
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 import yaml
 
+from robojackson.cli.pictures.robot_sheets import new_robot
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.robot_descriptions import read_description
 from robojackson.retarget.retarget_config import RetargetConfig
@@ -18,6 +20,8 @@ from robojackson.rl.evaluation.strict_success import StrictEvaluator
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.description_check import problems
 from robojackson.robot.first_description import Draft, first_description, name_of_model
+from robojackson.robot.keypoint_guess import guess_keypoints
+from robojackson.robot.limbs import skeleton_of
 from robojackson.robot.model import load_robot
 from tests.fixtures import machine
 from tests.fixtures.own_robot import gymnasium_model
@@ -81,6 +85,20 @@ def test_a_machine_with_ankles_and_soles_is_described_with_its_corners(tmp_path:
     assert found.rest_pose["left_knee"] == 0.3
 
 
+def test_toes_are_not_the_foot(tmp_path: Path) -> None:
+    plain = guess_keypoints(skeleton_of(mujoco.MjModel.from_xml_string(machine.mjcf())))
+    toe = (
+        '<body name="{0}_toe" pos=".1 0 -.02"><geom size=".01" fromto="0 0 0 .03 0 0" mass=".05"/>'
+        '<joint name="{0}_toe_pitch" axis="0 1 0" range="-.5 .5"/></body>'
+    )
+    text = machine.mjcf()
+    for side in ("left", "right"):
+        site = f'<site name="{side}_foot"'
+        text = text.replace(site, toe.format(side) + site)
+    toed = guess_keypoints(skeleton_of(mujoco.MjModel.from_xml_string(text)))
+    assert toed["left_foot"] == plain["left_foot"]
+
+
 def test_a_model_below_the_file_is_named_from_there(tmp_path: Path) -> None:
     (tmp_path / "parts").mkdir()
     draft = first_description(model_file(tmp_path / "parts", machine.mjcf()), tmp_path, "it")
@@ -133,3 +151,10 @@ def test_what_is_no_robot_is_one_line(tmp_path: Path, content: str) -> None:
 def test_a_model_is_called_as_it_calls_itself(tmp_path: Path) -> None:
     named = model_file(tmp_path, machine.mjcf().replace('"machine"', json.dumps("My Robot-2")))
     assert name_of_model(named) == "my_robot_2"
+
+
+def test_a_name_of_a_file_is_one_that_a_description_may_have(tmp_path: Path) -> None:
+    model = model_file(tmp_path, machine.mjcf())
+    out = tmp_path / f"my robot ({'x' * 80}).yaml"
+    new_robot(model, out, force=False)
+    assert read_description(out).name == f"my_robot_{'x' * 55}"

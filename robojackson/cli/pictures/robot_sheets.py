@@ -83,9 +83,9 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
         BadConfiguration: MuJoCo cannot load the model.
         StoreError: the file exists and `force` is not given, or it cannot be written.
     """
-    from robojackson.robot.first_description import first_description, name_of_model
+    from robojackson.robot.first_description import first_description, name_of_model, robot_name
 
-    name = out.stem if out is not None else name_of_model(model)
+    name = robot_name(out.stem) if out is not None else name_of_model(model)
     if name in robot_names():
         name = f"my_{name}"
     target = out or Path(f"{name}.yaml")

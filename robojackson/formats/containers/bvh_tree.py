@@ -1,7 +1,8 @@
 """Any BVH (Biovision hierarchy) as a tree of nodes and its motion; units and axes as in the file.
 
 A node's rotation is the product of its rotation channels in the order in which they stand, degrees.
-The root stands at its offset plus its position channels; positions of other nodes are not read.
+The root stands at its offset plus its position channels; position channels of another node, where
+they are not zero throughout, stand for its offset.
 """
 
 from collections.abc import Iterator
@@ -87,7 +88,22 @@ class Tree:
         place[:, 0] = self.root()
         for index, node in enumerate(self.nodes[1:], start=1):
             turned[:, index] = turned[:, node.parent] @ local[:, index]
-            place[:, index] = place[:, node.parent] + turned[:, node.parent] @ node.offset
+            moved = self._moved(node)
+            place[:, index] = place[:, node.parent] + (
+                turned[:, node.parent] @ node.offset
+                if moved is None
+                else np.einsum("tij,tj->ti", turned[:, node.parent], moved)
+            )
+        return place
+
+    def _moved(self, node: Node) -> Float[np.ndarray, "T 3"] | None:
+        """Return where a node stands in its parent by its position channels; None without them."""
+        columns = [i for i, channel in enumerate(node.channels) if channel[1:] == _MOVE]
+        values = self.frames[:, [node.first + i for i in columns]]
+        if not values.any():
+            return None
+        place = np.tile(node.offset, (len(self.frames), 1))
+        place[:, ["XYZ".index(node.channels[i][0]) for i in columns]] = values
         return place
 
 

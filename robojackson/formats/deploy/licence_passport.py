@@ -39,6 +39,7 @@ ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
 }
 """Rights that a licence grants, in the order of `RIGHTS`; a licence that is not listed is
 unknown."""
+NOTHING_KNOWN: tuple[Answer, ...] = (UNKNOWN,) * len(RIGHTS)
 KINDS = ("clip", "body models", "motion", "weights", "robot model", "tracker", "software")
 RUNNER_NEEDS: Mapping[str, str] = {
     "mujoco": "Apache-2.0",
@@ -62,7 +63,7 @@ class Ingredient:
     Attributes:
         kind: One of `KINDS`.
         name: Name of the input.
-        licence: SPDX identifier, `own`, or `unknown`.
+        licence: SPDX identifier, several with AND between them, `own`, or `unknown`.
         note: Source of the licence, or what is open.
         sha256: Digest of the file, where it is known.
     """
@@ -76,8 +77,14 @@ class Ingredient:
     @property
     def allows(self) -> dict[str, Answer]:
         """Return what the licence allows."""
-        answers = ALLOWS.get(self.licence, (UNKNOWN,) * 4)
-        return dict(zip(RIGHTS, answers, strict=True))  # type: ignore[arg-type]
+        parts = [dict(zip(RIGHTS, ALLOWS.get(one, NOTHING_KNOWN), strict=True))
+                 for one in self.licence.split(" AND ")]  # fmt: skip
+        return {right: max((part[right] for part in parts), key=ORDER.index) for right in RIGHTS}
+
+    @property
+    def is_known(self) -> bool:
+        """Return whether it is known what the licence allows."""
+        return UNKNOWN not in self.allows.values()
 
 
 def with_declared(
@@ -92,7 +99,7 @@ def with_declared(
     for kind, licence in declared.items():
         if kind not in KINDS:
             raise BadConfiguration(f"--licence {kind}={licence}: kinds are {', '.join(KINDS)}")
-        mine = [one for one in found if one.kind == kind and one.licence == UNKNOWN]
+        mine = [one for one in found if one.kind == kind and not one.is_known]
         names = [one.name for one in mine] or [kind]
         found = [one for one in found if one not in mine]
         found += [Ingredient(kind, name, licence, "declared by the user") for name in names]
@@ -110,6 +117,7 @@ def robot_ingredient(description: RobotDescription, sha256: str) -> Ingredient:
     name, source = f"model of {description.name}", description.source
     if source is not None:
         note = f"{source.package} {source.version}; its text is in {TEXTS}"
+        note += f"; {source.copyright}" if source.copyright else ""
         return Ingredient("robot model", name, source.licence, note, sha256)
     package, colon, _ = description.mjcf.partition(":")
     if not colon or not package.isidentifier():

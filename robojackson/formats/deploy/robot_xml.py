@@ -47,12 +47,16 @@ def robot_xml(robot: Robot) -> bytes:
 
 
 def _strip_looks(spec: mujoco.MjSpec) -> None:
-    """Remove visual parts: geoms without collision and mass, and meshes."""
+    """Remove visual parts: geoms without collision and mass, meshes, textures, skins."""
     for geom in list(spec.geoms):
         weighs = geom.density and not geom.parent.explicitinertial
         collides = geom.contype or geom.conaffinity
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH and not (collides or weighs):
             spec.delete(geom)
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for each in (*spec.textures, *spec.skins):
+        spec.delete(each)
     used = {geom.meshname for geom in spec.geoms}
     for mesh in list(spec.meshes):
         if mesh.name not in used:

@@ -64,7 +64,7 @@ def certify(
     ratio = np.abs(_motor_torque(needs, found)) / robot.torque_limit
     return Certified(
         Certificate(found.slack, tempo.feasible_tempo(slack), tuple(findings)),
-        ratio[:, robot.actuated],
+        ratio,
         tolerance.force_bw * np.linalg.norm(found.left[:, :3], axis=1),
     )
 

@@ -21,7 +21,8 @@ class Motors:
     Attributes:
         hinge: Index of the driven hinge among `qpos[7:]`, one an actuator.
         gear: Torque per unit of control, N m: gear and gain of the actuator.
-        limit: Largest torque, N m (that, in size, x the control range).
+        limit: Largest torque, N m: that, in size, x the control range, within the force ranges of
+            actuator and joint.
     """
 
     hinge: Int[np.ndarray, " nu"]
@@ -35,8 +36,20 @@ class Motors:
         return Motors(
             hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
             gear=gear,
-            limit=np.abs(gear) * model.actuator_ctrlrange[:, 1],
+            limit=np.minimum(np.abs(gear) * model.actuator_ctrlrange[:, 1], _bounds(model)),
         )
+
+
+def _bounds(model: mujoco.MjModel) -> Float[np.ndarray, " nu"]:
+    """Return the largest torque that the force ranges of motors and of their joints allow, N m."""
+    joint = model.actuator_trnid[:, 0]
+    own = np.abs(model.actuator_gear[:, 0]) * np.abs(model.actuator_forcerange).max(1)
+    of_joint = np.abs(model.jnt_actfrcrange).max(1)[joint]
+    result: np.ndarray = np.minimum(
+        np.where(model.actuator_forcelimited > 0, own, np.inf),
+        np.where(model.jnt_actfrclimited[joint] > 0, of_joint, np.inf),
+    )
+    return result
 
 
 def gains(

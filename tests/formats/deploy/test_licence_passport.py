@@ -70,7 +70,8 @@ def test_a_kind_that_is_none_is_refused_with_those_that_are() -> None:
 def test_the_robots_licence_is_its_packages_and_unknown_for_a_file() -> None:
     own = description("humanoid")
     assert robot_ingredient(own, "0").licence == "MIT"
-    assert robot_ingredient(description("g1"), "0").licence == "Apache-2.0"
+    assert robot_ingredient(description("g1"), "0").licence == "Apache-2.0 AND BSD-3-Clause"
+    assert "Unitree" in robot_ingredient(description("g1"), "0").note
     assert robot_ingredient(replace(own, mjcf="robot.xml"), "0").licence == "unknown"
 
 
@@ -114,6 +115,20 @@ def test_the_weights_that_a_training_began_with_are_listed(
 ) -> None:
     assert ingredients(pack, tmp_path, start=start)[name] == licence
     assert not any(one.startswith("start") for one in ingredients(pack, tmp_path, start="scratch"))
+
+
+@pytest.mark.parametrize("said", ["unknown", "Creative Commons Attribution license"])
+def test_a_licence_that_says_nothing_is_declared_by_the_user(said: str) -> None:
+    clip = Ingredient("clip", "a.mp4", said, "its info.json")
+    assert not clip.is_known
+    (declared,) = with_declared([clip], {"clip": "CC-BY-4.0"})
+    assert (declared.name, declared.licence, declared.is_known) == ("a.mp4", "CC-BY-4.0", True)
+
+
+def test_several_licences_allow_what_the_strictest_does() -> None:
+    both = Ingredient("robot model", "g1", "Apache-2.0 AND CC-BY-NC-4.0")
+    assert both.allows == {"use": "notice", "change": "notice", "pass_on": "notice", "sell": "no"}
+    assert not Ingredient("robot model", "g1", "Apache-2.0 AND mine").is_known
 
 
 def test_what_the_runner_imports_is_listed_and_nothing_else(pack: Pack) -> None:
