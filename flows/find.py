@@ -134,9 +134,13 @@ def of_champion(row: Mapping[str, Any], settings: FindConfig) -> Artifact:
 
 def _candidate(row: Mapping[str, Any]) -> VideoCandidate:
     """Return the video of a row of the catalogue."""
-    words = {name: row[name] or "" for name in ("title", "query")}
-    named = {name: row[name] for name in ("video_id", "url", "source")}
-    return VideoCandidate(**named, **words)
+    return VideoCandidate(
+        video_id=row["video_id"],
+        url=row["url"],
+        title=row["title"] or "",
+        query=row["query"] or "",
+        source=row["source"],
+    )
 
 
 def _scored(row: Mapping[str, Any]) -> Artifact:

@@ -91,7 +91,7 @@ def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Ge
 
 def _flips(pairs: int) -> int:
     """Return the number of sign flips of a test: all of them up to `MOST_EXACT` pairs."""
-    return max(RESAMPLES, 2 ** min(pairs, MOST_EXACT))
+    return max(RESAMPLES, 1 << min(pairs, MOST_EXACT))
 
 
 def probability_of_improvement(

@@ -39,7 +39,7 @@ ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
 }
 """Rights that a licence grants, in the order of `RIGHTS`; a licence that is not listed is
 unknown."""
-NOTHING_KNOWN: tuple[Answer, ...] = (UNKNOWN,) * len(RIGHTS)
+NOTHING_KNOWN: tuple[Answer, ...] = ("unknown", "unknown", "unknown", "unknown")
 KINDS = ("clip", "body models", "motion", "weights", "robot model", "tracker", "software")
 RUNNER_NEEDS: Mapping[str, str] = {
     "mujoco": "Apache-2.0",

@@ -70,7 +70,9 @@ def beat_report(
 
     def counted(times: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         pictures = np.round(fps * times).astype(int)
-        return times[(pictures < len(danced)) & danced[np.minimum(pictures, len(danced) - 1)]]
+        counts = (pictures < len(danced)) & danced[np.minimum(pictures, len(danced) - 1)]
+        result: np.ndarray = times[counts]
+        return result
 
     beats = {name: counted(motion_beats(points, fps)) for name, points in motions.items()}
     last = list(beats)[-1]
