@@ -84,7 +84,7 @@ async def best(
     try:
         found = search_and_rank(requested, settings, run_id("dance"), reigning=reigning)
     except SearchFailed:
-        kept = reigning or candidate_catalogue.champion(store, requested.name)
+        kept = candidate_catalogue.champion(store, requested.name)
         if kept is None:
             raise
         return asdict(_stored(_candidate(kept), _scored(kept)) or _scored(kept))

@@ -36,18 +36,23 @@ from robojackson.errors import (
     NoPersonFound,
     RoboJacksonError,
     SearchFailed,
-    StoreError,
+    TrackTooShort,
+    UnreadableVideo,
+    VideoTooLong,
 )
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.run_names import slug_of
 from robojackson.pipeline.yaml_loader import build, load
+from robojackson.robot.model import load_robot
 from storage import candidate_catalogue
 from storage.artifact import Artifact
 from storage.leftovers import sweep
 from storage.store import Store
 from tasks.probe_video import SourceFile, probe_video
 
+OF_THE_VIDEO = (UnreadableVideo, VideoTooLong, TrackTooShort, NoPersonFound)
+"""Errors of a motion that another video may not have; all others are the machine's."""
 CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
 Facts = dict[str, Any]
 BOOK = "dances"
@@ -74,19 +79,20 @@ async def refresh(
         pipeline_overrides: Overrides of the pipeline; robot is a name of configs/robots, or the
             path, where the worker is, of the YAML of your own.
     Raises:
-        BadConfiguration: two dances of the book have the same letters and digits.
+        BadConfiguration: two dances of the book have the same letters and digits, or the robot's
+            model is not here.
         SearchFailed: every dance failed; the message has the reasons.
     """
     store, began = Store.from_environment(), datetime.now(UTC)
     sweep(store, work=False)
     load(FindConfig, config, overrides)  # before any dance
-    robot = describe_robot(load(PipelineConfig, pipeline, pipeline_overrides).robot).name
+    robot = load_robot(describe_robot(load(PipelineConfig, pipeline, pipeline_overrides).robot))
     given = (config, overrides or {}, pipeline, pipeline_overrides or {})
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
     waiting: list[str] = []
     for dance in _require_distinct(load(DanceBook, book)).pick(dances):
-        if dances is None and not is_due(store, dance, robot, began):
+        if dances is None and not is_due(store, dance, robot.description.name, began):
             waiting.append(dance.name)
             continue
         state = await refresh_dance(dance.name, asdict(dance), *given, return_state=True)
@@ -95,7 +101,7 @@ async def refresh(
             failed[dance.name] = reason_of(result)
         else:
             done[dance.name] = result
-            note(store, dance, robot, began, result)
+            note(store, dance, robot.description.name, began, result)
     candidate_catalogue.compact(store)
     await _log_summary(done, failed)
     if failed and not done:
@@ -128,8 +134,8 @@ async def refresh_dance(
 ) -> Facts:
     """Refresh one dance, from its name to a reference motion.
 
-    Configurations are named, not given: what is given is shown on Prefect's pages, and they may
-    hold the password of a proxy.
+    Configurations are named, not given: what is given, overrides among it, is shown on Prefect's
+    pages, and a file of configurations may hold the password of a proxy.
 
     Raises:
         SearchFailed: the source does not answer, or has no new video and none was chosen before.
@@ -153,9 +159,7 @@ async def refresh_dance(
         try:
             made = motion(store, video or of_champion(chosen, settings), stages)
             break
-        except StoreError:  # no fault of the video's
-            raise
-        except RoboJacksonError as cause:
+        except OF_THE_VIDEO as cause:
             candidate_catalogue.append(store, [{**chosen, **_failed(cause)}])
             before = candidate_catalogue.champion(*mine)
             if before is None:

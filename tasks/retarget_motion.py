@@ -2,6 +2,7 @@
 
 import json
 
+from robojackson.files.json_types import to_json_types
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.retargeting import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion as to_robot
@@ -22,7 +23,9 @@ def retarget_motion(
     store = Store.from_environment()
     motion = artifact_tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)
-    scorecard = json.dumps(scorecard_record(reference), indent=1).encode()
+    scorecard = json.dumps(
+        to_json_types(scorecard_record(reference)), indent=1, allow_nan=False
+    ).encode()
     return {
         "reference": artifact_tables.save(store, "retarget", "reference.parquet", reference),
         "scorecard": store.save("retarget", "scorecard.json", scorecard),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.quality.advice import advise
 from robojackson.clips.quality.stability import Stability
+from robojackson.files.json_types import to_json_types
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -156,7 +157,8 @@ def _written(
         files["beats"] = store.put(f"{folder}/{BEATS}", json.dumps(shown.beats).encode())
         card = _json(store, made["scorecard"]) | {"beats": shown.beats["figures"]}
         key = f"{folder}/{made['scorecard'].name}"
-        files["scorecard"] = store.put(key, json.dumps(card, indent=1).encode())
+        content = json.dumps(to_json_types(card), indent=1, allow_nan=False)
+        files["scorecard"] = store.put(key, content.encode())
     return {**kept, **files, "page": store.put(f"{folder}/{PAGE}", text.encode())}
 
 

@@ -38,7 +38,9 @@ def find_dance(query: str, source: str, address: str, top: int | None, config: F
     dance = build(Dance, words | {"source": source, "address": address}, "find")
     if source == "youtube":
         dance = replace(load(DanceBook, "dances").find(query), source=source, address=address)
-    if is_local(source):
+    if source == folder.NAME:
+        folder.videos(query, address)
+    elif is_local(source):
         search(query, address, 1, config.web, datetime.now(UTC))
     return replace(dance, top=top or (ALL if source == folder.NAME else None))
 

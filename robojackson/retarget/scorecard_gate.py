@@ -47,7 +47,8 @@ _MENDING = {
 def failures(card: Mapping[str, float]) -> list[str]:
     """Return the names of the gated figures over their bars; a missing or non-finite figure
     fails."""
-    return [name for name, bar in BARS.items() if not card.get(name, np.nan) <= bar]
+    found = {name: card.get(name) for name in BARS}
+    return [n for n, bar in BARS.items() if (value := found[n]) is None or not value <= bar]
 
 
 def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:

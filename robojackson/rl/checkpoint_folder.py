@@ -87,20 +87,30 @@ def write_checkpoint(out: Path, save: Callable[[Path], None], results: Mapping[s
     shutil.rmtree(old, ignore_errors=True)
 
 
-def begin(out: Path) -> None:
-    """Prepare the folder of a training that has no checkpoint: existing files are another's.
+def require_free(out: Path) -> None:
+    """Refuse a folder in which a training would replace files of something else.
 
     Raises:
         StoreError: `checkpoint` or `replay` is not of a training of ours.
     """
+    if newest_checkpoint(out) is not None:
+        return
     for name in (CHECKPOINT, OLD_CHECKPOINT):
         if (out / name).is_dir() and any((out / name).iterdir()):
             _refuse(out / name)
     replay = out / REPLAY
-    if replay.is_dir():
-        if not all(OWN_REPLAY.fullmatch(file.name) for file in replay.iterdir()):
-            _refuse(replay)
-        shutil.rmtree(replay, ignore_errors=True)
+    if replay.is_dir() and not all(OWN_REPLAY.fullmatch(file.name) for file in replay.iterdir()):
+        _refuse(replay)
+
+
+def begin(out: Path) -> None:
+    """Prepare the folder of a training that has no checkpoint: existing files are another's.
+
+    Raises:
+        StoreError: as `require_free`.
+    """
+    require_free(out)
+    shutil.rmtree(out / REPLAY, ignore_errors=True)
     _set_results_aside(out)
 
 

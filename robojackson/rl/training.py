@@ -15,7 +15,7 @@ from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
-from robojackson.rl.checkpoint_folder import NETWORKS, newest_checkpoint
+from robojackson.rl.checkpoint_folder import NETWORKS, newest_checkpoint, require_free
 from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.track_config import RandomConfig
 from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConfig, TrainConfig
@@ -72,6 +72,7 @@ def train_policy(
     if not config.has_budget:
         raise BadConfiguration("training needs a budget: steps, minutes or cpu_minutes")
     hooks = hooks or Hooks()
+    require_free(out)
     networks = _start(config, robot, out)
     out.mkdir(parents=True, exist_ok=True)
     held = held_alone(config, robot, reference)
@@ -85,6 +86,7 @@ def train_policy(
         tqc = residual_learning(config, robot, reference, held)
     else:
         networks, tqc = _fitting(networks, core, config, robot)
+    _warn_of_short_budget(tqc, config.steps)
     seen = core.actor_size if core.actor_size < core.observation_size else None
     trainer = make_trainer(config.trainer, env, tqc, config.seed, seen)
     if networks is not None:
@@ -163,15 +165,18 @@ def residual_learning(
     if control_of(config.track).root_state == "estimated":
         preset["action_penalty"] = ESTIMATED_PENALTY
     asked = [name for name in preset if getattr(config.tqc, name) != getattr(usual, name)]
-    polish = replace(config.tqc, **{n: x for n, x in preset.items() if n not in asked})
-    if config.steps is not None and polish.burn_in >= config.steps:
+    return replace(config.tqc, **{n: x for n, x in preset.items() if n not in asked})
+
+
+def _warn_of_short_budget(tqc: TqcConfig, steps: int | None) -> None:
+    """Log a warning where the actor would never learn."""
+    if steps is not None and 0 < tqc.burn_in >= steps:
         log.warning(
             "the critics learn alone for %s transitions (tqc.burn_in) and the budget is %s: the "
-            "policy will do what the feedback alone does",
-            f"{polish.burn_in:,}",
-            f"{config.steps:,}",
+            "policy stays as it begins",
+            f"{tqc.burn_in:,}",
+            f"{steps:,}",
         )
-    return polish
 
 
 def held_alone(

@@ -86,17 +86,25 @@ def _bound(hinge: mujoco.MjsJoint, limit: float) -> None:
 
 
 def _limit(motors: list[mujoco.MjsActuator], limit: float) -> None:
-    """Give the motors of one joint the control ranges with which they give a torque at most, Nm."""
-    force = [abs(each.gear[0] * each.gainprm[0]) for each in motors]
-    torque = sum(f * np.abs(each.ctrlrange).max() for f, each in zip(force, motors, strict=True))
-    for each, own in zip(motors, force, strict=True):
-        if np.any(each.forcerange) and own and not np.isclose(torque, limit):
-            each.forcelimited = False
-        if torque > 0 and not np.isclose(torque, limit):
-            each.ctrlrange = np.asarray(each.ctrlrange) * (limit / torque)
-        elif torque == 0 and own > 0:  # no range in the MJCF
-            each.ctrlrange = np.array([-1.0, 1.0]) * limit / (own * len(motors))
+    """Give the motors of one joint the control ranges with which they give a torque at most, Nm,
+    where control and force ranges allow another."""
+    factors = [abs(each.gear[0] * each.gainprm[0]) for each in motors]
+    reach = [f * np.abs(each.ctrlrange).max() for f, each in zip(factors, motors, strict=True)]
+    if np.isclose(sum(map(_within_force, motors, reach)), limit):
+        return
+    for each, factor in zip(motors, factors, strict=True):
+        each.forcelimited = False
+        if sum(reach) > 0:
+            each.ctrlrange = np.asarray(each.ctrlrange) * (limit / sum(reach))
+        elif factor > 0:  # no range in the MJCF
+            each.ctrlrange = np.array([-1.0, 1.0]) * limit / (factor * len(motors))
             each.ctrllimited = True
+
+
+def _within_force(motor: mujoco.MjsActuator, torque: float) -> float:
+    """Return a torque, Nm, within what the force range of a motor allows, if it has one."""
+    force = abs(motor.gear[0]) * np.abs(motor.forcerange).max()
+    return float(min(torque, force)) if force > 0 else float(torque)
 
 
 def _add_motor(spec: mujoco.MjSpec, hinge: str, limit: float) -> None:

@@ -128,6 +128,21 @@ def test_a_steadier_choice_of_the_nightly_refresh_is_danced(
 
 
 @pytest.mark.medium
+def test_without_a_net_the_last_choice_of_any_search_is_danced(
+    records: None, store_folder: Path, config: str
+) -> None:
+    store = Store(store_folder)
+    for run, name in (("refresh-1", "of the night"), ("dance-2", "of the day")):
+        kept = store.save("video", "clip.mp4", name.encode())
+        facts = {"dance": "APT", "run_id": run, "source": "youtube", "video_id": run}
+        facts |= {"url": f"https://host/{run}", "decision": "chosen"}
+        times = {"retrieved_at": NOW, "decided_at": datetime.now(UTC)}
+        chosen = {"video_key": kept.key, "video_sha256": kept.sha256}
+        candidate_catalogue.append(store, [{**facts, **times, **chosen}])
+    assert files("apt dance", config) == {"apt.mp4": b"of the day"}
+
+
+@pytest.mark.medium
 def test_without_a_net_and_without_a_choice_the_search_has_failed(
     records: None, store_folder: Path, config: str
 ) -> None:

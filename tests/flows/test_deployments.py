@@ -45,6 +45,11 @@ def test_a_deployment_is_a_flow_with_the_parameters_it_gives(deployment: dict[st
     assert set(deployment.get("parameters", {})) <= set(known)
 
 
+def test_missed_nights_do_not_run_at_once() -> None:
+    (nightly,) = (each for each in DEPLOYMENTS if each["name"] == "nightly")
+    assert nightly["concurrency_limit"] == {"limit": 1, "collision_strategy": "CANCEL_NEW"}
+
+
 def test_the_refresh_runs_every_night_and_by_hand() -> None:
     ours = {f"{flow_of(d).name}/{d['name']}": d.get("schedules", []) for d in DEPLOYMENTS}
     assert [schedule["cron"] for schedule in ours["refresh/nightly"]] == ["0 3 * * *"]

@@ -274,11 +274,14 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     assert ("site", "new") in candidate_catalogue.known(night.store, "APT")
 
 
-def test_a_full_disk_is_no_fault_of_the_video(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "fault", [StoreError("No space left on device"), BadConfiguration("its model is not here")]
+)
+def test_a_fault_of_the_machine_is_none_of_the_video(
+    fault: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    night = Night(Store(tmp_path), monkeypatch, {"new": StoreError("No space left on device")})
-    with pytest.raises(StoreError):
+    night = Night(Store(tmp_path), monkeypatch, dict.fromkeys(("new", "old", "oldest"), fault))
+    with pytest.raises(type(fault)):
         night.refreshed()
     assert night.champion == "new", "the next night makes its motion"
 

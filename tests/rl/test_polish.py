@@ -10,7 +10,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.train_config import TrackConfig, TrainConfig
-from robojackson.rl.training import polishes, residual_learning, sharper
+from robojackson.rl.training import _warn_of_short_budget, polishes, residual_learning, sharper
 from robojackson.robot.model import Robot
 
 
@@ -36,16 +36,21 @@ def test_a_motion_that_ends_is_polished(fed: Robot, sway: ReferenceMotion) -> No
 
 
 def test_what_is_set_by_hand_goes_before_the_preset_of_a_polish(
-    fed: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
+    fed: Robot, sway: ReferenceMotion
 ) -> None:
     ending = replace(sway, cyclic=False)
     own = {"tqc.burn_in": 40, "tqc.action_penalty": 0.01}
     tqc = residual_learning(configured(**own), fed, ending, 0.5)
     assert (tqc.burn_in, tqc.action_penalty) == (40, 0.01)
     assert tqc.log_std_init == PRESETS["polish"]["log_std_init"]
-    assert not caplog.records
-    residual_learning(configured(), fed, ending, 0.5)
-    assert "for 50,000 transitions (tqc.burn_in) and the budget is 100" in caplog.text
+
+
+@pytest.mark.parametrize(("steps", "is_short"), [(40, True), (41, False), (None, False)])
+def test_a_budget_in_which_the_actor_never_learns_is_reported(
+    steps: int | None, is_short: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    _warn_of_short_budget(replace(configured().tqc, burn_in=40), steps)
+    assert ("for 40 transitions (tqc.burn_in) and the budget is 40" in caplog.text) == is_short
 
 
 def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:

@@ -168,12 +168,16 @@ def with_motors(path: Path, change: Callable[[str], str]) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("gain", [1.0, -50.0])
-def test_a_motor_of_the_mjcf_gives_what_the_yaml_allows(tmp_path: Path, gain: float) -> None:
-    """What retargeting reckons with is what the simulation gives, whatever its gear and gain."""
-    general = f'<general gainprm="{gain}" '
+@pytest.mark.parametrize("gain", ['gainprm="1"', 'gainprm="-50"', 'forcerange="-.2 .2"'])
+@pytest.mark.parametrize("usual", [30.0, 40.0])
+def test_a_motor_of_the_mjcf_gives_what_the_yaml_allows(
+    tmp_path: Path, gain: str, usual: float
+) -> None:
+    """What retargeting reckons with is what the simulation gives, whatever its gear, its gain and
+    its range of forces."""
+    general = f"<general {gain} "
     mjcf = with_motors(tmp_path / "motors.xml", lambda text: text.replace("<motor ", general))
-    robot = altered(mjcf=mjcf, torque_limits={"*": 30.0, "abdomen_z": 10.0})
+    robot = altered(mjcf=mjcf, torque_limits={"*": usual, "abdomen_z": 10.0})
     require_trainable(robot)
     motors, data = Motors.of(robot.model), mujoco.MjData(robot.model)
     np.testing.assert_allclose(motors.limit, robot.torque_limit[motors.hinge])

@@ -84,7 +84,7 @@ def program() -> tuple[str, ...]:
     """
     name, path = "robojackson", sys.argv[0]
     known = shutil.which(name) is not None
-    if not known and os.path.basename(path) == "__main__.py":
+    if not known and path.endswith(os.path.join(name, "__main__.py")):
         return sys.executable, "-m", name
     if known or os.path.basename(path) != name:
         return (name,)

@@ -77,10 +77,9 @@ def _plots(
     from robojackson.report.plots import run_plots
     from robojackson.report.plots.feasibility_plot import feasibility_strip
 
-    motors = [name for name, moved in zip(robot.joint_names, robot.actuated, strict=True) if moved]
     figures = {
         CONTACTS: run_plots.contact_strip(sequence, reference),
-        TORQUES: run_plots.torque_heat_map(reference, motors),
+        TORQUES: run_plots.torque_heat_map(reference, reference.joint_names),
     }
     if reference.certificate is not None:
         figures[FEASIBILITY] = feasibility_strip(reference)

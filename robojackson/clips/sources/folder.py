@@ -20,13 +20,20 @@ def search(
 ) -> list[VideoCandidate]:
     """Return the videos directly inside a folder, by name; all of them, for any count and words
     are."""
-    folder = Path(address or query)
+    words = query if address else ""
+    return [_candidate(path.absolute(), words, now) for path in videos(query, address)]
+
+
+def videos(query: str, address: str) -> tuple[Path, ...]:
+    """Return the files of a search.
+
+    Raises:
+        SearchFailed: the folder is not there, or holds no video.
+    """
     try:
-        paths = list_videos(folder)
+        return list_videos(Path(address or query))
     except (UnreadableVideo, OSError) as cause:
         raise SearchFailed(f"{NAME}: {clean_text(cause)}") from cause
-    words = query if address else ""
-    return [_candidate(path.absolute(), words, now) for path in paths]
 
 
 def _candidate(path: Path, query: str, now: datetime) -> VideoCandidate:

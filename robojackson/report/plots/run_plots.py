@@ -125,7 +125,7 @@ def torque_heat_map(reference: ReferenceMotion, motors: Sequence[str]) -> Figure
     """Plot |torque| over its limit, a row a motor: blue within the limit, orange to red beyond.
 
     Args:
-        motors: Names of the hinges with a motor, as the columns of `torque_ratio`.
+        motors: Names of the hinges, as the columns of `torque_ratio`.
     """
     ratio = np.asarray(reference.torque_ratio).T
     figure, (axes,) = figure_of(7.0, 0.8 + 0.2 * len(motors))

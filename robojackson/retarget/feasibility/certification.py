@@ -28,7 +28,7 @@ class Certified:
     """A motion's certificate, and the loads it was made from."""
 
     certificate: Certificate
-    torque_ratio: Float[np.ndarray, "S A"]
+    torque_ratio: Float[np.ndarray, "S J"]
     missing_bw: Float[np.ndarray, " S"]
 
 

@@ -31,7 +31,7 @@ def make_standing_motion(robot: Robot) -> ReferenceMotion:
         body_pos_w=held(data.xpos[1:]),
         keypoints_w=held(data.site_xpos[robot.keypoint_sites]),
         contact=np.ones((STEPS, len(robot.contact_names)), np.int8),
-        torque_ratio=np.zeros((STEPS, model.nu)),
+        torque_ratio=np.zeros((STEPS, model.nq - 7)),
         source_time_s=np.arange(STEPS) * dt,
         joint_names=robot.joint_names,
         body_names=robot.body_names,
