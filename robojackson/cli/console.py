@@ -29,7 +29,7 @@ P = ParamSpec("P")
 SECONDS_BETWEEN_LINES = 15.0
 """Interval of progress lines where every line stays, seconds."""
 
-APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp")
+APP_PACKAGES = ("prefect", "fastapi", "sqlalchemy", "yt_dlp", "uvicorn", "starlette", "httpx")
 """Line that installs the extra `app`: without it only the commands of one stage work."""
 INSTALL_APP = "pip install 'robojackson[app]'"
 

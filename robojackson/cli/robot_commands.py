@@ -29,6 +29,8 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
     """List the robots of configs/robots; add downloads a model, new and check are for your own."""
     if context.invoked_subcommand is None:
         show_robots(as_json=as_json)
+    elif as_json:
+        raise typer.BadParameter("give --json after the subcommand", param_hint="--json")
 
 
 @robots.command()

@@ -26,6 +26,11 @@ Watcher = Callable[[int, np.ndarray, np.ndarray], None]
 visibility; NaN where no person was detected."""
 SIZES: tuple[str, ...] = ("lite", "full", "heavy")
 ASSETS = Path(__file__).parent.parent / "assets"
+BUILDING = (
+    "build it: python -m tools.assets.build_pose_models --size {size}"
+    if (ASSETS.parents[1] / "tools").is_dir()
+    else "it is built in a checkout of the repository alone: take another quality"
+)
 GRAPHICS_LIBRARIES = ("libEGL.so.1", "libGLESv2.so.2")
 GRAPHICS_INSTALL = (
     "apt-get install --no-install-recommends libegl1 libgles2 libopengl0 libgl1-mesa-dri"
@@ -48,10 +53,7 @@ def model_path(size: str) -> Path:
         raise UnknownName("pose model", size, "clips.pose_detector", SIZES)
     path = ASSETS / f"pose_landmarker_{size}.task"
     if not path.is_file():
-        raise MissingDependency(
-            f"{path.name} is not installed; "
-            f"build it: python -m tools.assets.build_pose_models --size {size}"
-        )
+        raise MissingDependency(f"{path.name} is not installed; {BUILDING.format(size=size)}")
     return path
 
 

@@ -25,7 +25,7 @@ def write(policy: PolicyNetwork) -> bytes:
         from onnx import TensorProto, helper, numpy_helper
     except ImportError as error:
         raise MissingDependency(
-            "ONNX files need the onnx package: .venv/bin/pip install -e '.[onnx]'"
+            "ONNX files need the onnx package: pip install 'robojackson[onnx]'"
         ) from error
     nodes, weights, flowing = [], [], "observation"
     last = len(policy.layers) - 1

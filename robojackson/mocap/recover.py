@@ -169,7 +169,7 @@ def focal_of(track: LandmarkTrack, scene: SceneEvidence | None, config: MocapCon
 def finish_motion(view: View, config: MocapConfig) -> SmplSequence:
     """Refine the points of a view, solve them and stand the body on the floor."""
     track, landmarks, seen = view.track, view.landmarks, view.points
-    rest = fit_skeleton(seen, config.bone_trust)
+    rest = fit_skeleton(seen[landmarks.valid], config.bone_trust)  # filled in: no measurement
     sure = landmarks.visibility
     if config.refine.enabled:
         evidence = gather(seen, sure, rest, track.fps, config.refine, view.depth_m)

@@ -49,7 +49,8 @@ def mapped(
     qpos = np.zeros((len(time_s), robot.model.nq))
     sigma = _SMOOTHING_S / robot.description.control_dt
     turns = Rotation.from_rotvec(sequence.global_orient) * Rotation.from_matrix(SMPL_TO_WORLD.T)
-    qpos[:, 3:7] = sign_continuous(from_rotation(Slerp(frames, turns)(time_s)))
+    inside = np.minimum(time_s, frames[-1])  # the last may be later by its last digit
+    qpos[:, 3:7] = sign_continuous(from_rotation(Slerp(frames, turns)(inside)))
     for column in range(3):
         qpos[:, column] = _smoothed(np.interp(time_s, frames, root[:, column]), sigma)
     for column in range(hinges.shape[1]):

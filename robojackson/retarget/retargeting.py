@@ -29,7 +29,7 @@ from robojackson.retarget.targets.clip_ends import danced_frames
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps, targets
-from robojackson.retarget.targets.tails import Tailed, settled
+from robojackson.retarget.targets.tails import settled
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
 from robojackson.robot.tree_kinematics import pose, tree
@@ -90,12 +90,12 @@ def _retargeted(sequence: SmplSequence, robot: Robot, config: RetargetConfig) ->
     danced: Bool[np.ndarray, " S"] | None = None
     if config.method == "optimise":
         tailed, upright, able, floor_mm, lean_deg, sway_m = danced_motion(clip, robot, config)
-        extra |= _tail_seconds(tailed)
         extra |= {"keypoint_floor_mm": floor_mm, "lean_deg": lean_deg, "sway_cm": 100.0 * sway_m}
         extra |= _slowing(able, upright, robot)
         qpos, aims, upright = able.qpos, able.aims, warped(upright, able.steps)
         time_s = times_at(tailed.source_time(clip.time_s), able.steps)
         danced = able.danced
+        extra |= _tail_seconds(danced, aims.dt)
         stands = (slice(0, tailed.lead), slice(len(qpos) - tailed.stand, len(qpos)))
         qpos = settled(qpos, stands, aims.dt)
     else:
@@ -151,10 +151,11 @@ def assemble(
     return ReferenceMotion(**parts, scorecard={**card, **extra})  # type: ignore[arg-type]
 
 
-def _tail_seconds(tailed: Tailed) -> dict[str, float]:
+def _tail_seconds(danced: Bool[np.ndarray, " S"], dt: float) -> dict[str, float]:
     """Return how long the motion stands, and goes to and from the stand, around the clip."""
-    dt, after = tailed.aims.dt, len(tailed.aims) - tailed.clip.stop
-    return {"lead_s": tailed.clip.start * dt, "tail_s": after * dt} if after else {}
+    first, last = np.flatnonzero(danced)[[0, -1]]
+    after = len(danced) - 1 - int(last)
+    return {"lead_s": int(first) * dt, "tail_s": after * dt} if after else {}
 
 
 def _without_tails(
@@ -174,12 +175,12 @@ def _without_tails(
 
 
 def _slowing(able: Feasible, upright: Targets, robot: Robot) -> dict[str, float]:
-    """Return how much slower than the clip the motion is by its own choice, and the clip's own
-    jerk."""
+    """Return how much slower than the clip the motion is by its own choice, without its tails, and
+    the clip's own jerk."""
     source = upright.keypoints_w[:, robot.keypoint_weights > 0]
     return {
-        "tempo_mean": len(upright) / len(able.steps),
-        "tempo_min": float(np.gradient(able.steps).min()),
+        "tempo_mean": (able.clip.stop - able.clip.start) / int(able.danced.sum()),
+        "tempo_min": float(np.gradient(able.steps)[able.danced].min()),
         "source_jerk_m_s3": jerk(source, upright.dt),
     }
 

@@ -84,7 +84,7 @@ def from_hub(repository: str) -> Path:
         from huggingface_sb3 import load_from_hub
     except ImportError as error:
         raise MissingDependency(
-            f"start {repository!r} needs the hub's client: .venv/bin/pip install huggingface_sb3"
+            f"start {repository!r} needs the hub's client: pip install huggingface_sb3"
         ) from error
     name = repository.split("/")[1]
     try:

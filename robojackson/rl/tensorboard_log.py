@@ -20,7 +20,7 @@ class ScalarLog:
             from tensorboard.summary.writer.event_file_writer import EventFileWriter
         except ImportError as error:
             raise MissingDependency(
-                "logs for TensorBoard need its package: .venv/bin/pip install tensorboard, "
+                "logs for TensorBoard need its package: pip install tensorboard, "
                 "or leave tensorboard off"
             ) from error
         folder.mkdir(parents=True, exist_ok=True)

@@ -309,3 +309,10 @@ def test_the_commands_answer_as_json_with_an_exit_code(tmp_path: Path):
     assert [(each.code, each.answer["ok"]) for each in result] == [(0, True), (1, False)]
     assert good.with_suffix(".png").is_file()
     assert not bad.with_suffix(".png").exists()
+
+
+@pytest.mark.parametrize("group", ["robots", "trackers"])
+def test_an_option_before_a_subcommand_is_not_dropped(group: str) -> None:
+    done = commands.in_process(group, "--json", "add", "nosuch")
+    assert (done.code, done.out) == (2, "")
+    assert "give --json after the subcommand" in done.err

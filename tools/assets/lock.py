@@ -1,10 +1,12 @@
-"""The hashed locks in `locks/`, one for each Python: every package but torch, with its digests.
+"""The hashed locks in `locks/`, one for each Python: packages with their digests, all but torch and
+tfp-nightly.
 
     python -m pip install uv && python -m tools.assets.lock
 
 To install from one: torch first (its builds differ by machine), then
 
     python -m pip install --require-hashes --no-deps -r locks/py311.txt
+    python -m pip install --no-deps --pre tfp-nightly
     python -m pip install --no-deps -e .
 """
 
@@ -16,9 +18,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13")
 EXTRAS = ("app", "fast", "s3", "onnx", "trackers")
-APART = re.compile(r"^(torch|triton|nvidia-|tfp-nightly|opencv-(contrib-)?python==)")
-"""Packages that come with torch, from where it comes; those that would hide the headless OpenCV."""
-HEAD = "# Made by `python -m tools.assets.lock`; torch is apart.\n"
+APART = re.compile(r"^(torch|triton|nvidia-|cuda-|tfp-nightly|opencv-(contrib-)?python==)")
+"""Packages that come with torch, from where it comes; a nightly build, which no digest holds for
+long; those that would hide the headless OpenCV."""
+HEAD = "# Made by `python -m tools.assets.lock`; torch and tfp-nightly are apart.\n"
 
 
 def lock(python: str) -> str:

@@ -6,6 +6,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, distributions, requires, version
 from typing import Any
 
@@ -58,13 +59,15 @@ def examine() -> dict[str, Any]:
     missing += [f"{name}: {_again()}" for name in REQUIRED if packages[name] is None]
     missing += _system_line(libraries)
     missing += [words for size, words in models.items() if words and size in NEEDED_MODELS]
-    missing += [
+    hiding = [
         f"{name} hides the headless OpenCV: pip uninstall {name}, then reinstall "
         "opencv-python-headless with --no-deps --force-reinstall"
         for name in OTHER_OPENCV
         if installed(name)
     ]
-    optional = [f"{name}: {_extra(of)}" for name, of in OPTIONAL.items() if packages[name] is None]
+    missing += [] if imports_opencv() else hiding
+    optional = hiding if imports_opencv() else []
+    optional += [f"{name}: {_extra(of)}" for name, of in OPTIONAL.items() if packages[name] is None]
     optional += _torch_line()
     optional += [words for size, words in models.items() if words and size not in NEEDED_MODELS]
     engine = javascript_runtimes.usable()
@@ -112,6 +115,17 @@ def installed(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
+
+
+@cache
+def imports_opencv() -> bool:
+    """Return whether OpenCV can be imported: packages that hide the headless one need a display's
+    libraries, and bring their own where these are there."""
+    try:
+        import cv2  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def _extra(name: str) -> str:

@@ -19,6 +19,7 @@ from robojackson.cli.learning import training_process
 from robojackson.errors import BadConfiguration
 from robojackson.files import tables
 from robojackson.files.file_tree import results_in
+from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.bundled_clips import bundled
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
@@ -72,7 +73,6 @@ def pretrain(
     else:
         evaluated = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
     made = out / f"walker_{kind}.safetensors"
-    made.write_bytes(networks.to_bytes())
     words = ["--kind", kind, *_command_options(overrides)]
     words += [] if robot is None else ["--robot", robot]
     facts = {
@@ -83,7 +83,9 @@ def pretrain(
         "curve": curve(out),
         "evaluation": evaluated,
     }
-    (out / "walker.json").write_text(json.dumps(facts, indent=1, default=float))
+    with results_in(out) as files:
+        files.write(made.name, networks.to_bytes())
+        files.write("walker.json", json.dumps(to_json_types(facts), indent=1).encode())
     return {"walker": str(made)} | _installed(made, machine.description, kind) | facts
 
 

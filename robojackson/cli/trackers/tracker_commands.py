@@ -31,6 +31,8 @@ def listed(context: typer.Context, as_json: Json = False) -> None:
     """List the trackers of configs/trackers; add downloads the network of one."""
     if context.invoked_subcommand is None:
         show_trackers(as_json=as_json)
+    elif as_json:
+        raise typer.BadParameter("give --json after the subcommand", param_hint="--json")
 
 
 @trackers.command()

@@ -15,6 +15,7 @@ from robojackson.config import config_dataclass
 
 PERSON_MARGIN = 0.15
 FEWEST_CORNERS = 8
+USUAL_FPS = 30.0
 CORNER_QUALITY, CORNER_DISTANCE = 0.01, 7
 LEAST_TEXTURE = 3e-3
 """Share of the best corner; pixels; of Lucas-Kanade: along a plain edge nothing can be followed."""
@@ -29,7 +30,7 @@ class CameraConfig:
         fewest: Pairs that are compared in a short clip.
         short_side: Pixels of the short side of the pictures that are compared.
         corners: Most corners that are followed.
-        still: Displacement of a camera that stands, image diagonals a frame.
+        still: Displacement of a camera that stands, image diagonals in a thirtieth of a second.
     """
 
     samples_per_s: float = Field(default=2.0, gt=0)
@@ -44,6 +45,7 @@ class CameraMotion:
 
     def __init__(self, frames: int, fps: float, config: CameraConfig) -> None:
         self._config = config
+        self._still = config.still * USUAL_FPS / fps
         self._chosen = spread(frames - 1, fps, config.samples_per_s, config.fewest)
         self._before: np.ndarray | None = None
         self.displacements: list[float] = []
@@ -61,7 +63,7 @@ class CameraMotion:
     def static_share(self) -> float:
         """Share of the pairs between which the camera stood still; 1 where nothing shows it."""
         known = [d for d in self.displacements if not np.isnan(d)]
-        return float(np.mean(np.array(known) <= self._config.still)) if known else 1.0
+        return float(np.mean(np.array(known) <= self._still)) if known else 1.0
 
     def _small(self, image: np.ndarray) -> np.ndarray:
         factor = min(1.0, self._config.short_side / min(image.shape[:2]))

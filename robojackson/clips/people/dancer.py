@@ -100,8 +100,9 @@ def track_dancer(
     passes = 3 if config.number in (None, 1) else 2
     later = _shifted(progress, info.frames, passes - 2, passes)
     cast = track_people(path, info, config.detection, config.identity, later)
-    if len(cast.rows) < 2 and config.number in (None, 1):
-        return single
+    if len(cast.rows) < 2 and config.number in (None, 1):  # the second one was a mistake
+        later = _shifted(progress, info.frames, passes - 1, passes)
+        return look_again(path, info, size, single, config.close_up, config.reverse, later)
     number = config.number or 1
     if number > len(cast.rows):
         raise NoPersonFound(f"there is no person {number} among {len(cast.rows)}: {cast}", path)

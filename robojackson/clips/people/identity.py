@@ -97,7 +97,7 @@ def by_size(
 
 
 def _lasts(tracklet: Tracklet, shortest_s: float, period_s: float) -> bool:
-    return len(tracklet.frames) * period_s >= min(shortest_s, 10 * period_s)
+    return len(tracklet.frames) * period_s >= max(min(shortest_s, 10 * period_s), 2.5 * period_s)
 
 
 def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:

@@ -16,6 +16,9 @@ from robojackson.clips.people.person_detection import PersonDetection
 from robojackson.clips.people.person_extent import stature, trunk
 from robojackson.config import config_dataclass
 
+LEAST_PAUSE = 1.5
+"""Gap that a tracklet outlives at least, frames: one may be longer than the pause."""
+
 
 @config_dataclass
 class TrackletConfig:
@@ -83,10 +86,12 @@ def find_tracklets(
     """Return the unambiguous stretches, and those of two people detected as one."""
     done: list[Tracklet] = []
     alive: list[Tracklet] = []
+    period_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    pause_s = max(config.pause_s, LEAST_PAUSE * period_s) + 1e-6
     for index, detections in enumerate(frames):
         now = float(time_s[index])
-        done += [p for p in alive if now - p.time_s[-1] > config.pause_s + 1e-6]
-        alive = [p for p in alive if now - p.time_s[-1] <= config.pause_s + 1e-6]
+        done += [p for p in alive if now - p.time_s[-1] > pause_s]
+        alive = [p for p in alive if now - p.time_s[-1] <= pause_s]
         seen = [_tracklet_of(index, now, detection, size) for detection in detections]
         resumes = _claims(alive, seen, config)
         ended, blended = _touches(alive, seen, resumes, config)

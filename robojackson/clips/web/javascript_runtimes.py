@@ -13,7 +13,7 @@ OLDEST = {"deno": (2, 3), "node": (22,), "bun": (1, 2, 11)}
 VERSION_TIMEOUT_S = 10.0
 ADVICE = (
     "a JavaScript runtime, without which yt-dlp misses formats of YouTube: "
-    ".venv/bin/pip install deno (or node 22 or later)"
+    "pip install deno (or node 22 or later)"
 )
 
 

@@ -58,7 +58,7 @@ class _Graph:
             import onnx
         except ImportError as error:
             raise MissingDependency(
-                "ONNX files need the onnx package: .venv/bin/pip install -e '.[onnx]'"
+                "ONNX files need the onnx package: pip install 'robojackson[onnx]'"
             ) from error
         self._onnx = onnx
         self._nodes: list[Any] = []

@@ -33,7 +33,7 @@ def make_trainer(
         from robojackson.rl.tqc.sbx_trainer import SbxTrainer
     except ImportError as error:
         raise MissingDependency(
-            f"trainer 'sbx' needs JAX ({error}): .venv/bin/pip install -e '.[fast]', "
-            "or choose --trainer sb3"
+            f"trainer 'sbx' needs JAX ({error}): pip install 'robojackson[fast]', or "
+            "choose trainer sb3"
         ) from error
     return SbxTrainer(env, config, seed, seen)

@@ -91,3 +91,16 @@ def test_the_largest_steady_person_is_the_first() -> None:
 
 def test_no_person_in_any_frame_is_no_track() -> None:
     assert tracks([[]] * 10) == []
+
+
+@pytest.mark.parametrize("fps", [30.0, 12.0, 10.0, 9.0])
+def test_two_who_cross_keep_their_ways_at_low_frame_rates(fps: float) -> None:
+    """A frame of less than ten a second is longer than the pause that ends a tracklet."""
+    times = np.arange(round(6 * fps)) / fps
+    ways = 120.0 + 400.0 * times / 6, 520.0 - 400.0 * times / 6
+    frames = [[seen(a), seen(b)] for a, b in zip(*ways, strict=True)]
+    found = identify(frames, times, SIZE, IdentityConfig())
+    assert len(found) == 2
+    for track in found:
+        x = hips_x(track)
+        assert x == pytest.approx(ways[int(x[0] > 300)])

@@ -82,6 +82,16 @@ def test_a_clip_without_background_counts_as_still() -> None:
     assert motion.static_share == 1.0
 
 
+@pytest.mark.parametrize("fps", [10.0, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize(("speed", "still"), [(0.06, 1.0), (0.15, 0.0)])
+def test_a_camera_stands_by_its_speed_whatever_the_frame_rate(
+    fps: float, speed: float, still: float
+) -> None:
+    motion = CameraMotion(30, fps, CameraConfig())
+    motion.displacements = [speed / fps] * 8
+    assert motion.static_share == still
+
+
 def test_frames_are_spread_evenly() -> None:
     chosen = sorted(spread(300, 30.0, 1.0, 4))
     assert (len(chosen), set(np.diff(chosen))) == (10, {30})

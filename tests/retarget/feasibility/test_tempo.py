@@ -1,10 +1,13 @@
 """Warps are smooth, never too slow, keep cycles closed, and come only where slowing down helps."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from robojackson.retarget import retargeting
 from robojackson.retarget.feasibility import inverse_dynamics
 from robojackson.retarget.feasibility.contact_wrench import Tolerance, supply
 from robojackson.retarget.feasibility.tempo import (
@@ -17,6 +20,7 @@ from robojackson.retarget.feasibility.tempo import (
     warp,
     warped,
 )
+from robojackson.retarget.feasible_motion import Feasible
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.targets.cycle import human_clip
@@ -137,3 +141,18 @@ def test_slower_tempos_are_tried_where_the_own_one_is_too_fast(robot: Robot):
     for row, k in zip(found, GRID, strict=True):
         demand = inverse_dynamics.demand(robot, qpos, forces.at(k), near, Tolerance())
         np.testing.assert_allclose(row[hard], supply(demand).slack[hard], atol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.7, 1.0])
+def test_the_tempo_is_that_of_the_dance_without_its_tails(rate: float) -> None:
+    """70 steps before it, 180 of the dance, 200 after it."""
+    dance = np.arange(69.5 + rate / 2, 249.5, rate)
+    steps = np.concatenate([np.arange(70.0), dance, np.arange(250.0, 450.0)])
+    aims = SimpleNamespace(keypoints_w=np.zeros((len(steps), 14, 3)), dt=0.02)
+    able = Feasible(np.zeros((len(steps), 7)), cast(Any, aims), steps, slice(70, 250))
+    robot = SimpleNamespace(keypoint_weights=np.ones(14))
+    found = retargeting._slowing(able, cast(Any, aims), cast(Any, robot))
+    assert found["tempo_mean"] == pytest.approx(rate, abs=0.01)
+    assert found["tempo_min"] == pytest.approx(rate, abs=0.01)
+    tails = retargeting._tail_seconds(able.danced, 0.02)
+    assert tails == pytest.approx({"lead_s": 1.4, "tail_s": 4.0}, abs=0.021)
