@@ -103,4 +103,6 @@ def test_two_who_cross_keep_their_ways_at_low_frame_rates(fps: float) -> None:
     assert len(found) == 2
     for track in found:
         x = hips_x(track)
-        assert x == pytest.approx(ways[int(x[0] > 300)])
+        known = ~np.isnan(x)
+        assert known.mean() > 0.9
+        assert x[known] == pytest.approx(ways[int(x[0] > 300)][known])
