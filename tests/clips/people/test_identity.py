@@ -104,5 +104,5 @@ def test_two_who_cross_keep_their_ways_at_low_frame_rates(fps: float) -> None:
     for track in found:
         x = hips_x(track)
         known = ~np.isnan(x)
-        assert known.mean() > 0.9
+        assert known.mean() > 0.8
         assert x[known] == pytest.approx(ways[int(x[0] > 300)][known])
