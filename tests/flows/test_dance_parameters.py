@@ -132,8 +132,8 @@ def test_the_bar_gives_the_regulator_the_minutes_of_its_search(
     regulated = PipelineConfig(robot="g1", instant=True, tracker="regulator")
     assert instant_minutes(regulated) == INSTANT_MINUTES + SEARCH_MINUTES
     monkeypatch.setenv("ROBOJACKSON_STORE", str(tmp_path / "store"))
-    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
     file, description = stand_in(tmp_path)
     write_yaml(description, tmp_path / "configs")
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path / "configs"))
     add_tracker(NAME, file)
     assert instant_minutes(PipelineConfig(robot="humanoid", instant=True)) == INSTANT_MINUTES
