@@ -21,6 +21,7 @@ from robojackson.robot.fall import rule_lines
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
 from robojackson.robot.model_files import read_model
+from robojackson.robot.names import robot_name
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
@@ -30,8 +31,6 @@ SIDEWAYS = 0.9
 """Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
 """Of a control step; training takes five steps of the model by default."""
-LONGEST_NAME = 64
-"""Characters of a robot's name."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -143,11 +142,6 @@ def name_of_model(path: Path) -> str:
     named = re.search(r"<mujoco[^>]*\bmodel=\"([^\"]+)\"", text)
     name = re.sub(r"\W+", "_", named.group(1) if named else path.stem).strip("_").lower()
     return robot_name(name)
-
-
-def robot_name(text: str) -> str:
-    """Return a text as a name that a description may have."""
-    return re.sub(r"[^\w.-]+", "_", text).strip("_.-")[:LONGEST_NAME] or "robot"
 
 
 def _place(path: Path, folder: Path) -> str:

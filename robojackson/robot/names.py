@@ -1,5 +1,6 @@
 """Names in a robot description: every one is known, or the error lists those that are."""
 
+import re
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
 
@@ -9,6 +10,8 @@ from robojackson.robot.description import RobotDescription
 PELVIS = "pelvis"
 FEET, HANDS = ("left_foot", "right_foot"), ("left_hand", "right_hand")
 """Keypoints that every robot has."""
+LONGEST_NAME = 64
+"""Characters of a robot's name."""
 
 
 def where(description: RobotDescription, key: str) -> str:
@@ -31,3 +34,8 @@ def matching(kind: str, pattern: str, names: Iterable[str], place: str) -> list[
     if not found:
         raise UnknownName(kind, pattern, place, names)
     return found
+
+
+def robot_name(text: str) -> str:
+    """Return a text as a name that a description may have."""
+    return re.sub(r"[^\w.-]+", "_", text).strip("_.-")[:LONGEST_NAME] or "robot"

@@ -83,7 +83,8 @@ def new_robot(model: Path, out: Path | None, force: bool) -> tuple[Figures, list
         BadConfiguration: MuJoCo cannot load the model.
         StoreError: the file exists and `force` is not given, or it cannot be written.
     """
-    from robojackson.robot.first_description import first_description, name_of_model, robot_name
+    from robojackson.robot.first_description import first_description, name_of_model
+    from robojackson.robot.names import robot_name
 
     name = robot_name(out.stem) if out is not None else name_of_model(model)
     if name in robot_names():
