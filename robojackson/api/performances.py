@@ -98,8 +98,7 @@ def perform(
     """Let a robot stand, go into the first dance, dance all of them, and stand again.
 
     Args:
-        dances: Videos, motions of people, or reference motions of the robot; or files of them; one,
-            or several in their order.
+        dances: One or several videos, motions of people or reference motions, or files of them.
         robot: Name, YAML file, or what `load_robot` returned; the first tracker's when None.
         tracker: Who dances: a name of configs/trackers or a tracker; the robot's first one that is
             here when None.
@@ -119,8 +118,7 @@ def perform(
     machine = load_robot(usual_robot() if robot is None else robot)
     solving = retarget or RetargetConfig()
     who = _tracker(tracker, machine)
-    several = [dances] if isinstance(dances, ONE) else dances
-    motions = [_motion(dance, i, machine, solving) for i, dance in enumerate(several)]
+    motions = [_motion(d, i, machine, solving) for i, d in enumerate(_several(dances))]
     planned = plan(motions, machine, programme or ProgrammeConfig(), solving)
     how = config or PerformanceConfig()
     if who.description.network == "regulator":
@@ -166,6 +164,11 @@ def _tracker(given: str | Tracker | None, robot: Robot) -> Tracker:
             "a performance needs another, such as regulator"
         )
     return who
+
+
+def _several(dances: Dance | Sequence[Dance]) -> Sequence[Dance]:
+    """Return one dance or several as a list."""
+    return [dances] if isinstance(dances, ONE) else dances
 
 
 def _motion(
