@@ -87,7 +87,7 @@ async def best(
         kept = candidate_catalogue.champion(store, requested.name)
         if kept is None:
             raise
-        return asdict(_stored(_candidate(kept), _scored(kept)) or _scored(kept))
+        return asdict(stored_video(store, WebVideo.of(_candidate(kept))) or _scored(kept))
     table = rows(found)
     chosen = table[0] if found.chosen else reigning
     await publish_search(requested.name, table, chosen)
@@ -116,7 +116,7 @@ def of_candidate(
     ((_, video),) = download_candidates([candidate], "dance", settings)
     if isinstance(video, Artifact):
         return video
-    stored = _stored(candidate, scored)
+    stored = stored_video(Store.from_environment(), WebVideo.of(candidate)) or scored
     if stored is None:
         raise SearchFailed(f"{candidate.title or candidate.video_id}: {video}")
     get_run_logger().warning("%s: %s: its stored video is used", candidate.url, video)
@@ -146,11 +146,6 @@ def _candidate(row: Mapping[str, Any]) -> VideoCandidate:
 def _scored(row: Mapping[str, Any]) -> Artifact:
     """Return the file that was assessed."""
     return Artifact(key=row["video_key"], sha256=row["video_sha256"])
-
-
-def _stored(candidate: VideoCandidate, scored: Artifact | None) -> Artifact | None:
-    """Return the largest file that was downloaded of a video, or the one that was assessed."""
-    return stored_video(Store.from_environment(), WebVideo.of(candidate)) or scored
 
 
 def nothing(found: SearchResult) -> str:

@@ -86,13 +86,14 @@ async def refresh(
     store, began = Store.from_environment(), datetime.now(UTC)
     sweep(store, work=False)
     load(FindConfig, config, overrides)  # before any dance
-    robot = load_robot(describe_robot(load(PipelineConfig, pipeline, pipeline_overrides).robot))
+    stages = load(PipelineConfig, pipeline, pipeline_overrides)
+    robot = load_robot(describe_robot(stages.robot)).description.name
     given = (config, overrides or {}, pipeline, pipeline_overrides or {})
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
     waiting: list[str] = []
     for dance in _require_distinct(load(DanceBook, book)).pick(dances):
-        if dances is None and not is_due(store, dance, robot.description.name, began):
+        if dances is None and not is_due(store, dance, robot, began):
             waiting.append(dance.name)
             continue
         state = await refresh_dance(dance.name, asdict(dance), *given, return_state=True)
@@ -101,7 +102,7 @@ async def refresh(
             failed[dance.name] = reason_of(result)
         else:
             done[dance.name] = result
-            note(store, dance, robot.description.name, began, result)
+            note(store, dance, robot, began, result)
     candidate_catalogue.compact(store)
     await _log_summary(done, failed)
     if failed and not done:

@@ -44,7 +44,7 @@ class Run:
 def record(store: Store, run: Run) -> Artifact:
     """Record a run, replacing its earlier record."""
     facts = to_json_types(asdict(run))
-    text = json.dumps(facts, default=str, indent=1, sort_keys=True, allow_nan=False)
+    text = json.dumps(facts, indent=1, sort_keys=True, allow_nan=False)
     return store.put(f"{FOLDER}/{run.run_id}.json", text.encode())
 
 

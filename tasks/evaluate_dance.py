@@ -1,12 +1,11 @@
 """The verdict on a policy, or on a tracker that was not trained on this dance."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robojackson.files import tables
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
@@ -80,7 +79,7 @@ def _saved(
 ) -> dict[str, Artifact]:
     """Return the artifacts of an evaluation; `common` are the columns that all its rows share."""
     rows = tables.encode_rows(EVALUATION_RECORD, [{**common, **row} for row in verdict.rows])
-    summary = json.dumps(to_json_types(verdict.summary), indent=1, allow_nan=False).encode()
+    summary = to_json(verdict.summary)
     rollout, name = Rollout(dt, verdict.rollout_qpos), f"{prefix}rollout.parquet"
     return {
         "evaluations": store.save(stage_name, f"{prefix}evaluations.parquet", rows),

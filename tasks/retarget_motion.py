@@ -1,8 +1,6 @@
 """Retarget the motion of a person to the reference motion of a robot."""
 
-import json
-
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.retargeting import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion as to_robot
@@ -23,9 +21,7 @@ def retarget_motion(
     store = Store.from_environment()
     motion = artifact_tables.read(SmplSequence, store, sequence)
     reference = to_robot(motion, load_robot(robot), config)
-    scorecard = json.dumps(
-        to_json_types(scorecard_record(reference)), indent=1, allow_nan=False
-    ).encode()
+    scorecard = to_json(scorecard_record(reference))
     return {
         "reference": artifact_tables.save(store, "retarget", "reference.parquet", reference),
         "scorecard": store.save("retarget", "scorecard.json", scorecard),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robojackson.clips.quality.advice import advise
 from robojackson.clips.quality.stability import Stability
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -157,8 +157,7 @@ def _written(
         files["beats"] = store.put(f"{folder}/{BEATS}", json.dumps(shown.beats).encode())
         card = _json(store, made["scorecard"]) | {"beats": shown.beats["figures"]}
         key = f"{folder}/{made['scorecard'].name}"
-        content = json.dumps(to_json_types(card), indent=1, allow_nan=False)
-        files["scorecard"] = store.put(key, content.encode())
+        files["scorecard"] = store.put(key, to_json(card))
     return {**kept, **files, "page": store.put(f"{folder}/{PAGE}", text.encode())}
 
 

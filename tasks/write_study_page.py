@@ -14,7 +14,7 @@ import numpy as np
 
 from configs.study_config import Move, Study
 from robojackson.errors import RoboJacksonError
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.files.sql_tables import RunQuery
 from robojackson.metrics import ablation_statistics
 from robojackson.pipeline.robot_descriptions import describe_robot
@@ -225,7 +225,7 @@ def _json(
         "comparisons": [asdict(comparison) for comparison in compared],
         "lines": [asdict(line) for line in lines],
     }
-    return json.dumps(to_json_types(text), indent=1, allow_nan=False).encode()
+    return to_json(text)
 
 
 def _file(title: str) -> str:

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from configs.dance_book import Dance
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.run_names import slug_of
 from storage.store import Store
@@ -39,8 +39,7 @@ def note(
     """Store the result and the times of a refresh."""
     times = {"started_at": began.isoformat(), "finished_at": datetime.now(UTC).isoformat()}
     facts = {**times, "dance": dance.name, "robot": robot, **result}
-    text = json.dumps(to_json_types(facts), indent=1, default=str, allow_nan=False)
-    store.put(_key(dance, robot), text.encode())
+    store.put(_key(dance, robot), to_json(facts))
 
 
 def _key(dance: Dance, robot: str) -> str:

@@ -1,6 +1,5 @@
 """Evaluate policies, and render videos of them."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -26,7 +25,7 @@ from robojackson.clips.video import VideoInfo
 from robojackson.errors import BadConfiguration
 from robojackson.files import tables
 from robojackson.files.file_tree import results_in
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
@@ -78,10 +77,10 @@ class PolicyEvaluation:
             StoreError: it cannot be written.
         """
         rows = tables.encode_rows(EVALUATION_RECORD, self.rows)
-        summary = json.dumps(to_json_types(self.summary), indent=1)
+        summary = to_json(self.summary)
         with results_in(Path(folder)) as files:
             files.write("evaluations.parquet", rows)
-            files.write("evaluation.json", summary.encode())
+            files.write("evaluation.json", summary)
             files.write("rollout.parquet", self.rollout.to_bytes())
         return Path(folder)
 

@@ -1,6 +1,5 @@
 """Performances: several dances in a row by one robot, with a tracker that follows them."""
 
-import json
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +15,7 @@ from robojackson.api.trackers import load_tracker
 from robojackson.clips.video import SUFFIXES
 from robojackson.errors import BadPolicy
 from robojackson.files.file_tree import results_in
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -81,7 +80,7 @@ class Performance:
         with results_in(Path(folder)) as files:
             files.write(PROGRAMME, self.programme.motion.to_bytes())
             files.write(ROLLOUT, self.rollout.to_bytes())
-            files.write(RESULT, json.dumps(to_json_types(answer), indent=1).encode())
+            files.write(RESULT, to_json(answer))
         return Path(folder)
 
 

@@ -4,7 +4,6 @@ PyAV reads the container itself, so a rotation tag is honoured and a file that e
 says so is distinguished from one that never was a video. Times in seconds, sizes in upright pixels.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -34,7 +33,7 @@ from robojackson.errors import (
     VideoTooLong,
 )
 from robojackson.files.file_tree import FileTree
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.motion.landmark_track import uneven
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
@@ -91,7 +90,7 @@ class VideoInfo:
             StoreError: the file cannot be written.
         """
         file = Path(path)
-        content = json.dumps(to_json_types(self), indent=1).encode()
+        content = to_json(self)
         FileTree(file.parent).write(file.name, content)
         return file
 

@@ -1,5 +1,6 @@
 """Values of the program in JSON's types: null, booleans, numbers, text, arrays and objects."""
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -26,3 +27,8 @@ def to_json_types(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, str | int | bool) else str(value)
+
+
+def to_json(value: object) -> bytes:
+    """Return a value as the content of a JSON file."""
+    return json.dumps(to_json_types(value), indent=1, allow_nan=False).encode()

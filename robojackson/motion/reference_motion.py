@@ -22,6 +22,7 @@ from robojackson.files.fact_types import (
     Text,
     Texts,
 )
+from robojackson.files.json_types import to_json_types
 from robojackson.files.table_file import Columns, Facts, TableFile, json_facts, numbered
 from robojackson.files.table_types import F32, F64, I32, STATE, WORLD, Column, TableSchema
 from robojackson.motion.certificate import Certificate, Finding
@@ -144,8 +145,7 @@ class ReferenceMotion(TableFile):
         columns = numbered("step", len(self), self.dt)
         columns |= {name: np.asarray(getattr(self, name)) for name in (*ARRAYS, "source_time_s")}
         facts = {name: getattr(self, name) for name in REFERENCE_MOTION.metadata}
-        card = self.scorecard.items()
-        facts["scorecard"] = {name: x if np.isfinite(x) else None for name, x in card}
+        facts["scorecard"] = to_json_types(self.scorecard)
         if self.certificate is not None:
             facts["certificate"] = asdict(self.certificate)
         if self.robot_file:

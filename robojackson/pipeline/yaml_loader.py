@@ -79,9 +79,10 @@ def _found(cls: type[Config], name_or_path: str | Path) -> Path:
 
 def _fits(cls: type[Config], name: str) -> bool:
     try:
-        return load(cls, name) is not None
+        load(cls, name)
     except BadConfiguration:
         return False
+    return True
 
 
 def parsed_overrides(overrides: Mapping[str, object]) -> dict[str, object]:

@@ -48,7 +48,7 @@ def failures(card: Mapping[str, float]) -> list[str]:
     """Return the names of the gated figures over their bars; a missing or non-finite figure
     fails."""
     found = {name: card.get(name) for name in BARS}
-    return [n for n, bar in BARS.items() if (value := found[n]) is None or not value <= bar]
+    return [name for name, x in found.items() if x is None or not x <= BARS[name]]
 
 
 def scorecard_record(motion: ReferenceMotion) -> dict[str, Any]:

@@ -164,8 +164,8 @@ def residual_learning(
     preset, usual = dict(PRESETS["polish"]), TqcConfig()
     if control_of(config.track).root_state == "estimated":
         preset["action_penalty"] = ESTIMATED_PENALTY
-    asked = [name for name in preset if getattr(config.tqc, name) != getattr(usual, name)]
-    return replace(config.tqc, **{n: x for n, x in preset.items() if n not in asked})
+    unset = {n: x for n, x in preset.items() if getattr(config.tqc, n) == getattr(usual, n)}
+    return replace(config.tqc, **unset)
 
 
 def _warn_of_short_budget(tqc: TqcConfig, steps: int | None) -> None:

@@ -113,15 +113,15 @@ def torque_limits(
     for index in range(model.nu):
         if model.actuator_trntype[index] == int(mujoco.mjtTrn.mjTRN_JOINT):
             joint = model.actuator_trnid[index, 0]
-            driven[joint - 1] += _force(model, index)
-            limit[joint - 1] = min(driven[joint - 1], _own_limit(model, joint))
+            driven[joint - 1] += motor_torque(model, index)
+            limit[joint - 1] = min(driven[joint - 1], joint_torque(model, joint))
     place = where(description, "torque_limits")
     named = per_hinge(description.torque_limits, joints, place) * description.gear_scale
     return np.where(np.isnan(named), limit, named)
 
 
-def _force(model: mujoco.MjModel, index: int) -> float:
-    """Return the largest torque of one actuator."""
+def motor_torque(model: mujoco.MjModel, index: int) -> float:
+    """Return the largest torque of one actuator, Nm; infinite without a range."""
     gear = abs(float(model.actuator_gear[index, 0]))
     force = np.inf
     is_motor = model.actuator_biastype[index] == int(mujoco.mjtBias.mjBIAS_NONE)
@@ -133,7 +133,8 @@ def _force(model: mujoco.MjModel, index: int) -> float:
     return gear * float(force)
 
 
-def _own_limit(model: mujoco.MjModel, joint: int) -> float:
+def joint_torque(model: mujoco.MjModel, joint: int) -> float:
+    """Return the bound that a joint has itself on the torque of its actuators, Nm."""
     if not model.jnt_actfrclimited[joint]:
         return np.inf
     return float(np.abs(model.jnt_actfrcrange[joint]).max())

@@ -16,7 +16,8 @@ LEG_WORDS = {
     "knee": ("knee", "shin", "calf", "shank", "tibia", "lowerleg"),
     "ankle": ("ankle", "foot", "sole", "toe"),
 }
-TOE = "toe"
+TOED: dict[str, tuple[str, ...]] = {"toe": ("toe",), "ankle": LEG_WORDS["ankle"]}
+"""Words of toes, and of what else is of a foot."""
 ARM_WORDS = {
     "shoulder": ("shoulder", "upperarm", "clavicle", "humerus", "scapula"),
     "elbow": ("elbow", "forearm", "lowerarm"),
@@ -159,31 +160,22 @@ def _limb(skeleton: Skeleton, bodies: tuple[int, ...], words: Words) -> Limb:
     hinges = hinges_of(model, bodies)
     parts: dict[str, list[int]] = {name: [] for name in words}
     for hinge in hinges:
-        own, body = [model.joint(hinge).name], [model.body(model.jnt_bodyid[hinge]).name]
-        kinds = (name for called in (own, body) for name in words if names_any(called, words[name]))
-        name = next(kinds, None)
+        name = _part_of(model, hinge, words)
         if name is not None:
             parts[name].append(hinge)
     first, second, third = parts
-    parts[third] = _without_toes(model, parts[third])
+    feet = [hinge for hinge in parts[third] if _part_of(model, hinge, TOED) != "toe"]
+    parts[third] = feet or parts[third]
     if parts[first] and parts[second]:
         return Limb(bodies, {k: tuple(v) for k, v in parts.items()}, True)
     return Limb(bodies, _by_distance(skeleton, bodies, hinges, tuple(words)), False)
 
 
-def _without_toes(model: mujoco.MjModel, hinges: list[int]) -> list[int]:
-    """Return the hinges at the end of a limb without those of toes, if there are others."""
-    kept = []
-    for hinge in hinges:
-        own = [model.joint(hinge).name]
-        called = (
-            own
-            if names_any(own, LEG_WORDS["ankle"])
-            else own + [model.body(model.jnt_bodyid[hinge]).name]
-        )
-        if not names_any(called, (TOE,)):
-            kept.append(hinge)
-    return kept or hinges
+def _part_of(model: mujoco.MjModel, hinge: int, words: Words) -> str | None:
+    """Return the part that a hinge's name has a word of, else its body's name; None without one."""
+    own, body = [model.joint(hinge).name], [model.body(model.jnt_bodyid[hinge]).name]
+    kinds = (name for called in (own, body) for name in words if names_any(called, words[name]))
+    return next(kinds, None)
 
 
 def _by_distance(

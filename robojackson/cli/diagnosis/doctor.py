@@ -6,7 +6,6 @@ import shlex
 import shutil
 import sys
 from collections.abc import Mapping
-from functools import cache
 from importlib.metadata import PackageNotFoundError, distributions, requires, version
 from typing import Any
 
@@ -65,8 +64,9 @@ def examine() -> dict[str, Any]:
         for name in OTHER_OPENCV
         if installed(name)
     ]
-    missing += [] if imports_opencv() else hiding
-    optional = hiding if imports_opencv() else []
+    works = imports_opencv()
+    missing += [] if works else hiding
+    optional = hiding if works else []
     optional += [f"{name}: {_extra(of)}" for name, of in OPTIONAL.items() if packages[name] is None]
     optional += _torch_line()
     optional += [words for size, words in models.items() if words and size not in NEEDED_MODELS]
@@ -117,7 +117,6 @@ def installed(name: str) -> str | None:
         return None
 
 
-@cache
 def imports_opencv() -> bool:
     """Return whether OpenCV can be imported: packages that hide the headless one need a display's
     libraries, and bring their own where these are there."""

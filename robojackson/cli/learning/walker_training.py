@@ -5,7 +5,6 @@ all 348, the others with weight zero. `track` imitates the bundled walk, on any 
 a robot for which none ships is saved where `start: walker` finds it.
 """
 
-import json
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -19,7 +18,7 @@ from robojackson.cli.learning import training_process
 from robojackson.errors import BadConfiguration
 from robojackson.files import tables
 from robojackson.files.file_tree import results_in
-from robojackson.files.json_types import to_json_types
+from robojackson.files.json_types import to_json
 from robojackson.pipeline.bundled_clips import bundled
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
@@ -85,7 +84,7 @@ def pretrain(
     }
     with results_in(out) as files:
         files.write(made.name, networks.to_bytes())
-        files.write("walker.json", json.dumps(to_json_types(facts), indent=1).encode())
+        files.write("walker.json", to_json(facts))
     return {"walker": str(made)} | _installed(made, machine.description, kind) | facts
 
 

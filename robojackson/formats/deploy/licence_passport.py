@@ -77,9 +77,8 @@ class Ingredient:
     @property
     def allows(self) -> dict[str, Answer]:
         """Return what the licence allows."""
-        parts = [dict(zip(RIGHTS, ALLOWS.get(one, NOTHING_KNOWN), strict=True))
-                 for one in self.licence.split(" AND ")]  # fmt: skip
-        return {right: max((part[right] for part in parts), key=ORDER.index) for right in RIGHTS}
+        parts = (ALLOWS.get(one, NOTHING_KNOWN) for one in self.licence.split(" AND "))
+        return _strictest(dict(zip(RIGHTS, answers, strict=True)) for answers in parts)
 
     @property
     def is_known(self) -> bool:
@@ -108,7 +107,12 @@ def with_declared(
 
 def together(ingredients: Iterable[Ingredient]) -> dict[str, Answer]:
     """Return what all licences together allow: the strictest answer of each right."""
-    every = [one.allows for one in ingredients]
+    return _strictest(one.allows for one in ingredients)
+
+
+def _strictest(answers: Iterable[Mapping[str, Answer]]) -> dict[str, Answer]:
+    """Return the strictest answer of each right."""
+    every = list(answers)
     return {right: max((one[right] for one in every), key=ORDER.index) for right in RIGHTS}
 
 

@@ -74,7 +74,8 @@ def warped(
     mono = inside.mean(1)
     window = np.hanning(reach + 1)[:-1, None]
     out = np.zeros((len(times) * HOP + reach, samples.shape[1]), np.float32)
-    stands = np.diff(times, append=2 * times[-1] - times[-2] if len(times) > 1 else np.inf) == 0
+    steps = np.diff(times)
+    stands = np.append(steps, steps[-1] if len(steps) else 1.0) == 0
     places = np.round(times * RATE).astype(int) + reach + SEARCH - HOP
     last = -1
     for index, place in enumerate(places):

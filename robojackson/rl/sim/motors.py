@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
+from robojackson.robot.actuation import joint_torque, motor_torque
 from robojackson.robot.description import FeedbackPath, RobotDescription
 from robojackson.robot.model import Robot
 
@@ -36,20 +37,14 @@ class Motors:
         return Motors(
             hinge=model.jnt_qposadr[model.actuator_trnid[:, 0]] - 7,
             gear=gear,
-            limit=np.minimum(np.abs(gear) * model.actuator_ctrlrange[:, 1], _bounds(model)),
+            limit=np.array([_largest(model, index) for index in range(model.nu)]),
         )
 
 
-def _bounds(model: mujoco.MjModel) -> Float[np.ndarray, " nu"]:
-    """Return the largest torque that the force ranges of motors and of their joints allow, N m."""
-    joint = model.actuator_trnid[:, 0]
-    own = np.abs(model.actuator_gear[:, 0]) * np.abs(model.actuator_forcerange).max(1)
-    of_joint = np.abs(model.jnt_actfrcrange).max(1)[joint]
-    result: np.ndarray = np.minimum(
-        np.where(model.actuator_forcelimited > 0, own, np.inf),
-        np.where(model.jnt_actfrclimited[joint] > 0, of_joint, np.inf),
-    )
-    return result
+def _largest(model: mujoco.MjModel, index: int) -> float:
+    """Return the largest torque of a motor, within the bound of its joint, N m."""
+    joint = int(model.actuator_trnid[index, 0])
+    return min(motor_torque(model, index), joint_torque(model, joint))
 
 
 def gains(
