@@ -118,7 +118,7 @@ def _closing(
     from robojackson.cli.lifetime.interruption import program
 
     words = [word for word in sys.argv[1:] if word != "--json"]
-    again = shlex.join([*program(), *words, "--delete"])
+    again = shlex.join([program(), *words, "--delete"])
     return [*rows, f"Would go: {size}. Nothing was removed.", f"next: {again}"]
 
 

@@ -195,7 +195,7 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
     if kind != "too_short" and INSTANT in sys.argv:
         from robojackson.cli.lifetime.interruption import program
 
-        return shlex.join([*program(), *(word for word in sys.argv[1:] if word != INSTANT)])
+        return shlex.join([program(), *(word for word in sys.argv[1:] if word != INSTANT)])
     if kind == "too_short":
         from robojackson.cli.lifetime.interruption import same_command
         from robojackson.rl.evaluation.verdict import SHORTEST_S

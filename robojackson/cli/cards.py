@@ -43,7 +43,7 @@ def closing(answer: Answer) -> list[str]:
 
 def command_line(*words: object) -> str:
     """Return a command that can be copied into a shell."""
-    return shlex.join([*program(), *map(str, words)])
+    return shlex.join([program(), *map(str, words)])
 
 
 def of_robot(robot: str | None) -> tuple[str, ...]:

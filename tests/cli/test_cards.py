@@ -121,11 +121,6 @@ def test_a_command_names_the_path_where_the_shell_does_not_know_the_name(
     assert interruption.same_command() == ".venv/bin/robojackson dance 'a b.mp4'"
     assert cards.command_line("doctor") == ".venv/bin/robojackson doctor"
     assert interruption.python() == interruption.sys.executable
-    monkeypatch.setattr(interruption.sys, "argv", ["x/robojackson/__main__.py", "doctor"])
-    assert interruption.same_command() == f"{interruption.sys.executable} -m robojackson doctor"
-    monkeypatch.setattr(interruption.sys, "argv", ["x/pytest/__main__.py", "doctor"])
-    assert interruption.same_command() == "robojackson doctor"
-    monkeypatch.setattr(interruption.sys, "argv", [".venv/bin/robojackson", "dance", "a b.mp4"])
     for name in ("robojackson", "python3"):
         (tmp_path / "bin").mkdir(exist_ok=True)
         (tmp_path / "bin" / name).touch(0o755)

@@ -94,7 +94,7 @@ def doctor_lines(found: Mapping[str, Any]) -> list[str]:
     count = len(found["missing"])
     if count:
         return [*rows, f"{count} required item{'s are' if count > 1 else ' is'} missing."]
-    following = shlex.join([*program(), "dance"])
+    following = shlex.join([program(), "dance"])
     return [*rows, "Everything required is installed.", f"next: {following}"]
 
 

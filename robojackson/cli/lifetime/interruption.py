@@ -77,19 +77,16 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c in SHOWN else "?" for c in text)
 
 
-def program() -> tuple[str, ...]:
-    """Return the words that start this program: its path where its name alone is not found.
+def program() -> str:
+    """Return the command that starts this program: its path where its name alone is not found.
 
     `make dance` runs it from an environment that the person's shell has not activated.
     """
     name, path = "robojackson", sys.argv[0]
-    known = shutil.which(name) is not None
-    if not known and path.endswith(os.path.join(name, "__main__.py")):
-        return sys.executable, "-m", name
-    if known or os.path.basename(path) != name:
-        return (name,)
+    if os.path.basename(path) != name or shutil.which(name) is not None:
+        return name
     inside = os.path.relpath(path)
-    return (path if inside.startswith(os.pardir) else inside,)
+    return path if inside.startswith(os.pardir) else inside
 
 
 def python() -> str:
@@ -99,7 +96,7 @@ def python() -> str:
 
 def same_command() -> str:
     """Return the command line of this process, to be typed again."""
-    return shlex.join([*program(), *sys.argv[1:]])
+    return shlex.join([program(), *sys.argv[1:]])
 
 
 def with_option(option: str, value: str, without: tuple[str, ...] = ()) -> str:
@@ -114,7 +111,7 @@ def with_option(option: str, value: str, without: tuple[str, ...] = ()) -> str:
             if word == name or word.startswith(f"{name}="):
                 del words[place : place + (2 if word == name else 1)]
                 break
-    return shlex.join([*program(), *words, option, value])
+    return shlex.join([program(), *words, option, value])
 
 
 def become_worker(supervisor: int, mark: str, last_line: int) -> None:
