@@ -23,7 +23,7 @@ TABLE, SUMMARY, ROLLOUT = "evaluations.parquet", "evaluation.json", "rollout.par
 
 @stage(
     models=robot_models,
-    reaches=("robojackson.rl.evaluation.policy_evaluation",),
+    reaches=("robojackson.api.evaluation",),
     unkeyed=("limit_s",),
 )
 async def evaluate_policy(

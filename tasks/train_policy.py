@@ -34,7 +34,7 @@ from tasks.runtime.stage import identity, stage
 from tasks.runtime.start_networks import local_start_file
 from tasks.runtime.training_progress import show_progress
 
-CODE = ("robojackson.rl.training",)
+CODE = ("robojackson.api.policy_training",)
 """Module of what the process runs."""
 SHORTEST_MINUTES = 0.5
 """What a training gets in any case."""

@@ -14,6 +14,7 @@ from importlib import import_module, resources
 from importlib.util import find_spec
 from pathlib import Path
 
+from tasks.runtime.import_statements import absolute, imported_names
 from tasks.runtime.parsed_modules import Parsed, ParsedModules
 
 PACKAGE = "robojackson"
@@ -119,7 +120,12 @@ def imports_of(path: Path, module: str = "") -> tuple[str, ...]:
     """Return every name that a file imports, dotted; `from a import b` gives `a` and `a.b`."""
     names = _parsed(*_version(path))[1]
     is_package = path.name == "__init__.py"
-    return tuple(_absolute(name, level, module, is_package) for name, level in names)
+    return tuple(absolute(name, level, module, is_package) for name, level in names)
+
+
+def file_digest(path: Path) -> str:
+    """Return the digest of one file's bare tree, without what it imports."""
+    return _parsed(*_version(path))[0]
 
 
 def bare_tree(source: str) -> str:
@@ -181,7 +187,7 @@ def _parsed(path: Path, changed_ns: int, size: int) -> Parsed:
 
 def _parse(source: str) -> Parsed:
     tree = ast.parse(source)
-    names = tuple(_imports(tree))
+    names = tuple(imported_names(tree))
     return hashlib.sha256(_bared(tree).encode()).hexdigest(), names
 
 
@@ -191,25 +197,6 @@ _modules = ParsedModules(_parse, Path(__file__))
 def _version(path: Path) -> tuple[Path, int, int]:
     stat = path.stat()
     return path, stat.st_mtime_ns, stat.st_size
-
-
-def _imports(tree: ast.AST) -> Iterator[tuple[str, int]]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, 0) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            yield base, node.level
-            for alias in node.names:
-                yield (f"{base}.{alias.name}" if base else alias.name), node.level
-
-
-def _absolute(name: str, level: int, module: str, is_package: bool) -> str:
-    if not level:
-        return name
-    parts = module.split(".")
-    kept = parts[: len(parts) - level + (1 if is_package else 0)]
-    return ".".join([*kept, name] if name else kept)
 
 
 def _parents(name: str) -> list[str]:

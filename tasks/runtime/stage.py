@@ -3,16 +3,15 @@
 A call runs as a cached Prefect task (`tasks/runtime/engine.py`). Inside `records_only` it is read
 from its record instead, and Prefect is never imported.
 
-The key of a call: the stage's name and text, its parsed configuration, the sha256 of the inputs'
-content, the digest of the modules that it reaches and of those that lay out the tables, the sha256
-of the models it loads, and the versions of mujoco and mediapipe. Paths are never in it. A record
-whose file is gone or altered counts as none (`tests/tasks/runtime/test_stage.py`).
+The key of a call: the stage's name and the text of its file, its parsed configuration, the sha256
+of the inputs' content, the digest of the modules that it reaches and of those that lay out the
+tables, the sha256 of the models it loads, and the versions of mujoco and mediapipe. Paths are never
+in it. A record whose file is gone or altered counts as none (`tests/tasks/runtime/test_stage.py`).
 """
 
 import hashlib
 import inspect
 import json
-import textwrap
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -27,7 +26,7 @@ from robojackson.errors import StoreError
 from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
-from tasks.runtime.code_digest import bare_tree, digest, imports_of, layout
+from tasks.runtime.code_digest import digest, file_digest, imports_of, layout
 
 if TYPE_CHECKING:
     from prefect import Task
@@ -76,7 +75,7 @@ class KeyRecipe:
 
     Attributes:
         name: Name of the stage.
-        text: Bare syntax tree of its function.
+        text: Digest of the bare syntax tree of its file, its helpers included.
         roots: Modules that it imports.
         models: Its parameters to the digests of the models that it loads.
         unkeyed: Parameters that do not change the result.
@@ -239,6 +238,6 @@ def identity(value: Any) -> Any:
 def _recipe_of(
     function: Callable[..., Any], reaches: tuple[str, ...], models: Models, unkeyed: tuple[str, ...]
 ) -> KeyRecipe:
-    text = bare_tree(textwrap.dedent(inspect.getsource(function)))
-    roots = (*imports_of(Path(inspect.getfile(function))), *reaches)
-    return KeyRecipe(function.__name__, text, roots, models, unkeyed)
+    file = Path(inspect.getfile(function))
+    roots = (*imports_of(file), *reaches)
+    return KeyRecipe(function.__name__, file_digest(file), roots, models, unkeyed)

@@ -16,6 +16,7 @@ from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
 
 LEASH_ROUNDS, LEASH_POWER = 3, 6
+TUNED_FPS = 30.0
 LARGEST_TIP = np.radians(40.0)
 TIP_HZ = 6.0
 
@@ -26,7 +27,7 @@ class FootPinningConfig:
 
     Attributes:
         track: Standard deviation of the camera's track across and along the ray, metres (y, x).
-        slip: Spread of a planted point's step between two frames, metres.
+        slip: Spread of a planted point's step between two frames at 30 frames a second, metres.
         leash_m: Shift along the ray beyond which the track gets an increasing weight, metres.
         wobble: Spread of the path's second difference at 30 frames a second, metres.
         ramp_s: Time of the transition from a planted to a moving foot, seconds.
@@ -37,7 +38,7 @@ class FootPinningConfig:
 
     track: tuple[float, float] = (0.02, 0.20)
     leash_m: float = 0.15
-    slip: float = 0.003
+    slip: float = 0.006
     wobble: float = 0.003
     ramp_s: float = 0.1
     fade_s: float = 0.2
@@ -55,8 +56,9 @@ def root_correction(
     """Return the horizontal shift of the body that keeps planted points still; z stays zero.
 
     Minimises over the clip, (x, y) being the shift: the step of planted points over `slip`, second
-    differences over `wobble`, x over the camera's spread in depth, and y minus x's component along
-    the ray over its spread across: a person who is further away than estimated is further aside
+    differences over `wobble` (both in proportion to the time between frames, and to its square, so
+    that every frame rate has the same minimum), x over the camera's spread in depth, and y minus
+    x's component along the ray over its spread across: a person who is further away than estimated is further aside
     too, or he would move in the image. A foot that slides along the ray looks planted; so where
     contacts would move the body further than `leash_m` from the track, the track dominates.
 
@@ -87,10 +89,12 @@ def _shift(
     frame."""
     held = (planted[1:] & planted[:-1]).astype(float)
     step = np.diff(feet, axis=0)[..., :2]
-    hold = held.sum(1) / config.slip**2
-    pull = np.einsum("tk,tka->ta", held, step) / config.slip**2
+    longer = TUNED_FPS / fps
+    slip = config.slip * longer
+    hold = held.sum(1) / slip**2
+    pull = np.einsum("tk,tka->ta", held, step) / slip**2
     across, along = config.track
-    path = path_bands(hold, config.wobble * (30.0 / fps) ** 2)
+    path = path_bands(hold, config.wobble * longer**2)
     bands = np.zeros((5, 2 * len(feet)))
     bands[0::2] = np.repeat(path, 2, axis=1)
     bands[4, 0::2] += trust / along**2 + (slope / across) ** 2

@@ -29,7 +29,9 @@ HIPS_BELOW = 0.06
 """Distance of its hips below the hip joints, share of the trunk: 2-4 cm in the images of two
 bodies, of which one is real, under eight cameras."""
 SWAP_PRIOR_M = 0.003
-"""Cost of a frame with exchanged sides, metres of mean displacement; tuned on person_cam2."""
+"""Cost of a thirtieth of a second with exchanged sides, metres of mean displacement; on person_cam2
+(60 frames a second) the same as twice of it, on which it was tuned."""
+PRIOR_FPS = 30.0
 FACING_FACTOR = 2.0
 """How much more it costs to exchange the sides of a person who was detected facing the camera."""
 SWAP_FPS = 15.0
@@ -188,13 +190,13 @@ def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:
 
     Each frame is kept or exchanged; a step costs the mean displacement of the body's landmarks
     (image at the person's scale and depth, metres) or, where frames are far apart, the turn of
-    shoulders and hips. An exchanged frame costs a little more, and most where the frames are near
+    shoulders and hips. Time with exchanged sides costs a little more, and most where the frames are near
     and the face was detected towards the camera: sides are exchanged in views from behind.
     """
     if fps < FEWEST_FPS:
         return np.zeros(len(landmarks.image), bool)
     same, other = _steps(landmarks) if fps >= SWAP_FPS else _turns(landmarks)
-    prior = SWAP_PRIOR_M if fps >= SWAP_FPS else FACING_PRIOR
+    prior = SWAP_PRIOR_M * PRIOR_FPS / fps if fps >= SWAP_FPS else FACING_PRIOR
     changes = np.stack([same, other, other, same], -1).reshape(-1, 2, 2)
     crossing = np.tile([0.0, prior], (len(landmarks.image), 1))
     if fps >= SWAP_FPS:

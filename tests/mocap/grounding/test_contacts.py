@@ -97,6 +97,24 @@ def test_root_correction_undoes_a_drift_that_planted_feet_reveal() -> None:
     assert np.ptp((feet + shift[:, None])[:, 0, 1]) < 0.1 * drift.max()
 
 
+@pytest.mark.parametrize("fps", [15.0, 60.0, 120.0])
+def test_root_correction_of_another_frame_rate_is_the_same_path(fps: float) -> None:
+    """Planted feet drift by 12 cm in a second, in which they are planted for two thirds."""
+
+    def path(fps: float) -> np.ndarray:
+        time = np.arange(round(2.0 * fps) + 1) / fps
+        feet = np.zeros((len(time), 4, 3))
+        feet[..., :2] = 0.12 * np.sin(np.pi * time[:, None, None] / 2.0)
+        planted = np.repeat(((time > 0.59) & (time < 1.81))[:, None], 4, axis=1)
+        config = foot_pinning.FootPinningConfig()
+        shift = foot_pinning.root_correction(feet, planted, np.zeros(len(time)), fps, config)
+        seconds = np.linspace(0.0, 2.0, 31)
+        return np.stack([np.interp(seconds, time, shift[:, axis]) for axis in range(2)])
+
+    assert np.ptp(path(30.0)) > 0.02
+    assert np.abs(path(fps) - path(30.0)).max() < 0.007
+
+
 def test_root_correction_without_contact_is_nothing() -> None:
     planted = np.zeros((FRAMES, 4), bool)
     shift = foot_pinning.root_correction(

@@ -13,6 +13,7 @@ from robojackson.mocap.landmarks.blazepose import (
     LANDMARK_NAMES,
     MIRROR,
     SHOULDERS,
+    Landmarks,
     fill_gaps,
     landmark,
     repair,
@@ -129,6 +130,29 @@ def test_landmarks_of_a_moved_camera_are_laid_onto_the_first_frame(
     shift = moved - track_landmarks(hip_shake).image
     assert np.allclose(shift[..., 0], np.arange(len(hip_shake))[:, None])
     assert np.allclose(shift[..., 1], 0.0)
+
+
+def test_twice_the_frame_rate_finds_the_same_exchanges(hip_shake: LandmarkTrack) -> None:
+    """A person who stands still and is nearly symmetric in the picture: how long the sides have to
+    be exchanged until that is believed is a time, not a count of frames."""
+
+    def left_exchanged(share: float, frames: int, fps: float) -> bool:
+        seen = track_landmarks(hip_shake)
+        image, local = (
+            np.repeat(each[:1] + share * (each[:1, MIRROR] - each[:1]), 3 * frames, axis=0)
+            for each in (seen.image, seen.local)
+        )
+        for each in (image, local):
+            each[frames : 2 * frames] = each[frames : 2 * frames, MIRROR]
+        still = np.ones(3 * frames, bool)
+        lm = Landmarks(image, local, np.ones((3 * frames, 33)), still)
+        return not swapped_frames(lm, fps).any()
+
+    shares = np.linspace(0.2, 0.5, 31)
+    usual = [left_exchanged(share, 30, 30.0) for share in shares]
+    assert True in usual and False in usual
+    assert [left_exchanged(share, 60, 60.0) for share in shares] == usual
+    assert [left_exchanged(share, 120, 120.0) for share in shares] == usual
 
 
 def test_a_turn_at_eight_frames_a_second_is_not_taken_for_an_exchange(

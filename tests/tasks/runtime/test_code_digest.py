@@ -12,6 +12,7 @@ import pytest
 
 from tasks.runtime.code_digest import bare_tree, digest, imports_of, reached
 
+ROOT = Path(__file__).parents[3]
 MODULES = {
     "__init__.py": '"""A package."""\n__version__ = "1"\n',
     "stage.py": "from science.formula import area\nimport numpy\n",
@@ -22,6 +23,10 @@ MODULES = {
     "inner/__init__.py": "from .deep import value\n",
     "inner/deep.py": "value = 1\n",
     "alone.py": "value = 2\n",
+    "typed.py": (
+        "import typing\n\nif typing.TYPE_CHECKING:\n    from science import alone\n"
+        "else:\n    from science import inner\n"
+    ),
 }
 
 
@@ -61,6 +66,31 @@ def test_imports_inside_functions_and_relative_ones_are_followed(science: Path) 
     ]
 
 
+def test_imports_for_type_checkers_alone_are_not_followed(science: Path) -> None:
+    found = reached(["science.typed"], "science", science)
+    assert found == ["science", "science.inner", "science.inner.deep", "science.typed"]
+
+
+@pytest.mark.parametrize(
+    ("task", "packages"),
+    [
+        ("download_video", ("mocap", "retarget", "rl", "robot", "report", "api")),
+        ("detect_landmarks", ("retarget", "rl", "robot", "report", "api")),
+        ("recover_motion", ("retarget", "rl", "robot", "report", "api")),
+        ("retarget_motion", ("rl", "report", "api")),
+        ("train_policy", ("report",)),
+    ],
+)
+def test_a_later_stage_is_no_part_of_an_earlier_ones_code(
+    task: str, packages: tuple[str, ...]
+) -> None:
+    """A changed reward must not repeat motion capture, nor a changed page a training."""
+    roots = imports_of(ROOT / "tasks" / f"{task}.py")
+    named = re.findall(r'"(robojackson(?:\.\w+)+)"', (ROOT / f"tasks/{task}.py").read_text())
+    modules = reached((*roots, *named), "robojackson", ROOT / "robojackson")
+    assert [name for name in modules if name.split(".")[1:2] in [[each] for each in packages]] == []
+
+
 def test_a_changed_formula_changes_the_digest(science: Path) -> None:
     before = digest_of(science)
     rewrite(science, "formula.py", "3.14", "3.1416")
@@ -95,7 +125,6 @@ def test_a_from_import_names_the_module_and_what_may_be_one(science: Path) -> No
     assert set(imports_of(science / "late.py")) == {"science", "science.inner"}
 
 
-ROOT = Path(__file__).parents[3]
 SAMPLE = """
 import math as m, os.path
 from . import inner

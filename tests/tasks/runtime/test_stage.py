@@ -64,7 +64,10 @@ from tasks.runtime.stage import stage
 
 @stage()
 def beside(value: Artifact) -> Artifact:
-    return done("beside", value_of(value) + 7)
+    return done("beside", value_of(value) + _offset())
+
+def _offset() -> int:
+    return 7
 """,
     "third.py": """
 from standin_io import done, value_of
@@ -172,6 +175,13 @@ def test_a_formula_with_another_result_runs_its_stage_and_what_depends_on_it(
     standin.run()
     standin.rewrite("formula", "2 * x", "5 * x")
     assert standin.run()[0] == ["second", "third"]
+
+
+@pytest.mark.medium
+def test_a_changed_helper_in_the_file_of_a_stage_runs_it_again(standin: Standin) -> None:
+    standin.run()
+    standin.rewrite("beside", "return 7", "return 9")
+    assert standin.run()[0] == ["beside", "third"]
 
 
 @pytest.mark.medium
