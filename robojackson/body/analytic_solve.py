@@ -37,8 +37,9 @@ def _levels() -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return [(g, np.array(PARENTS)[g], np.array(AIM_CHILD)[g]) for g in groups]
 
 
-CARRY_OVER_LIMIT = 0.015
-"""Metres; an adaptive bone that differs more from the predicted one is not corrected (HybrIK)."""
+CARRY_OVER_FULL, CARRY_OVER_NONE = 0.010, 0.030
+"""Metres; an adaptive bone that differs less from the predicted one is corrected in full, one that
+differs more not at all. HybrIK switches at 0.015, and everything that hangs on the bone jumps."""
 SAFEGUARD = 1e-8
 """What HybrIK adds to denominators, products of two bones in square metres."""
 LEVELS = _levels()
@@ -114,8 +115,10 @@ def _target_directions(
     length = np.linalg.norm(predicted, axis=-1, keepdims=True)
     rescaled = predicted * np.linalg.norm(bone, axis=-1, keepdims=True) / np.maximum(length, TINY)
     corrected = child - end
-    far = np.linalg.norm(corrected - rescaled, axis=-1, keepdims=True) > CARRY_OVER_LIMIT
-    result: np.ndarray = np.where(far, rescaled, corrected)
+    off = np.linalg.norm(corrected - rescaled, axis=-1, keepdims=True)
+    share = np.clip((off - CARRY_OVER_FULL) / (CARRY_OVER_NONE - CARRY_OVER_FULL), 0.0, 1.0)
+    kept = 1.0 - share**2 * (3.0 - 2.0 * share)
+    result: np.ndarray = rescaled + kept * (corrected - rescaled)
     return result
 
 

@@ -12,6 +12,8 @@ from robojackson.files.table_types import F32, F64, I32, Column, TableSchema
 LANDMARKS = 33
 ARRAYS = ("landmarks", "world_landmarks", "visibility")
 FACTS = ("fps", "width", "height", "person", "notes", "people", "brightness", "sharpness")
+LONGEST_STEP_S, LONGEST_STEP = 0.15, 2.5
+"""Two pictures further apart than both, seconds and mean periods, have a hole between them."""
 EVEN = 0.25
 """Frames that are off their place on an even grid by no more than this are evenly spaced."""
 
@@ -147,7 +149,8 @@ def even_times(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
 def evenly(track: LandmarkTrack) -> LandmarkTrack:
     """Return the same motion at equal spaces of 1 / fps, as the stages after this one need it.
 
-    Linear between two frames; a frame next to a gap has no person.
+    Linear between two frames; a frame next to a gap has no person, nor has one in a hole, in which
+    the camera took no pictures.
     """
     if track.time_s is None:
         return track
@@ -156,6 +159,7 @@ def evenly(track: LandmarkTrack) -> LandmarkTrack:
     before = after - 1
     span = np.maximum(track.time_s[after] - track.time_s[before], 1e-9)
     share = np.clip((when - track.time_s[before]) / span, 0.0, 1.0)
+    hole = (span > max(LONGEST_STEP_S, LONGEST_STEP / track.fps)) & (share > 0.0) & (share < 1.0)
 
     def at(values: np.ndarray) -> np.ndarray:
         weight = share.reshape(-1, *[1] * (values.ndim - 1))
@@ -164,11 +168,14 @@ def evenly(track: LandmarkTrack) -> LandmarkTrack:
             weight == 0.0, values[before], np.where(weight == 1.0, values[after], mixed)
         )
 
+    def seen(values: np.ndarray) -> np.ndarray:
+        return np.where(hole.reshape(-1, *[1] * (values.ndim - 1)), np.nan, at(values))
+
     return replace(
         track,
-        landmarks=at(track.landmarks),
-        world_landmarks=at(track.world_landmarks),
-        visibility=at(track.visibility),
+        landmarks=seen(track.landmarks),
+        world_landmarks=seen(track.world_landmarks),
+        visibility=seen(track.visibility),
         time_s=None,
         to_first=None if track.to_first is None else at(track.to_first),
     )

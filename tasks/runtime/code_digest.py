@@ -7,7 +7,7 @@ not in a syntax tree, so they change nothing; a changed formula does.
 import ast
 import hashlib
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import import_module, resources

@@ -39,6 +39,17 @@ def test_no_person_stays_no_person() -> None:
     assert np.isnan(evenly(track).landmarks[:, 0, 0]).any()
 
 
+def test_in_a_hole_of_time_there_is_no_person() -> None:
+    """A camera that froze for .6 s: what was danced then is unknown, no straight line."""
+    times = np.delete(np.arange(90) / 30.0, range(31, 49))
+    even = evenly(moving(times))
+    when = np.arange(len(even)) / even.fps
+    inside = (when > 30.0 / 30.0 + 1e-9) & (when < 49.0 / 30.0 - 1e-9)
+    assert np.isnan(even.landmarks[inside]).all()
+    assert np.isnan(even.visibility[inside]).all()
+    assert not np.isnan(even.landmarks[~inside]).any()
+
+
 def test_the_jitter_of_a_clock_is_no_varying_rate() -> None:
     times = np.arange(50) / 30 + np.random.default_rng(0).uniform(-0.004, 0.004, 50)
     assert not uneven(times - times[0], 30.0)

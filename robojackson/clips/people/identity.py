@@ -44,7 +44,7 @@ class IdentityConfig:
 
     tracklets: TrackletConfig = Field(default_factory=TrackletConfig)
     shortest_tracklet_s: float = Field(default=0.1, ge=0)
-    shortest_blend_s: float = Field(default=0.35, ge=0)
+    shortest_blend_s: float = Field(default=0.33, ge=0)
     memory_s: float = Field(default=0.7, gt=0)
     foresight_s: float = Field(default=0.5, ge=0)
     reach: float = Field(default=0.5, gt=0)
@@ -97,7 +97,7 @@ def by_size(
 
 
 def _lasts(tracklet: Tracklet, shortest_s: float, period_s: float) -> bool:
-    return len(tracklet.frames) * period_s >= max(min(shortest_s, 10 * period_s), 2.5 * period_s)
+    return len(tracklet.frames) * period_s >= max(shortest_s, 2.5 * period_s)
 
 
 def chains(tracklets: list[Tracklet], config: IdentityConfig) -> list[list[Tracklet]]:

@@ -55,7 +55,7 @@ class Quality:
         people: People in view in at least a third of the frames that were looked at.
         cuts: Cuts between scenes and jump cuts inside one.
         static_share: Share of the time in which the camera stands still.
-        moving_share: Share of frames that differ from the one before.
+        moving_share: Share of frames that differ from the one a tenth of a second before.
         flat_share: Share of the body in flat colour; large in a drawing.
     """
 

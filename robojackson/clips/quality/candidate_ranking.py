@@ -28,7 +28,7 @@ class FilterConfig:
         people: Most people.
         cuts: Most cuts.
         static_share: Least share of the time in which the camera stands still.
-        moving_share: Least share of frames that differ from the one before.
+        moving_share: Least share of frames that differ from the one a tenth of a second before.
         flat_share: Most share of the body in flat colour, which a drawing has.
         copies: When two clips count as the same.
     """

@@ -4,7 +4,7 @@ PySceneDetect's content detector finds cuts between scenes. A jump cut inside on
 person alone: all landmarks leap at once, which no dancer's do.
 """
 
-from typing import Any
+from collections import deque
 
 import cv2
 import numpy as np
@@ -14,6 +14,8 @@ from pydantic import Field
 from robojackson.clips.people.person_extent import heights_px
 from robojackson.config import config_dataclass
 from robojackson.motion.landmark_track import LandmarkTrack
+
+MOVING_S = 0.1
 
 
 @config_dataclass
@@ -48,7 +50,7 @@ class Changes:
         self._config, self._fps = config, fps
         shortest = max(1, round(config.shortest_scene_s * fps))
         self._detector = ContentDetector(config.threshold, shortest)
-        self._before: Any = None
+        self._earlier: deque[np.ndarray] = deque(maxlen=max(1, round(MOVING_S * fps)))
         self.frames = 0
         self.moved = 0
         self.cuts: list[int] = []
@@ -61,17 +63,18 @@ class Changes:
         small = np.ascontiguousarray(image[::step, ::step, ::-1])
         now = FrameTimecode(self.frames, self._fps)
         self.cuts += [cut.frame_num for cut in self._detector.process_frame(now, small)]
-        self.moved += self._before is not None and self._moves(small)
-        self._before = small
+        self.moved += bool(self._earlier) and self._moves(small)
+        self._earlier.append(small)
         self.frames += 1
 
     @property
     def moving_share(self) -> float:
-        """Share of frames that differ from the one before; a film has nearly 1, a still 0."""
+        """Share of frames that differ from the one a tenth of a second before; a film has nearly 1,
+        a still 0. Not from the one before, since a file of a high rate may repeat each picture."""
         return self.moved / max(self.frames - 1, 1)
 
     def _moves(self, small: np.ndarray) -> bool:
-        level = cv2.absdiff(small, self._before).max(-1)
+        level = cv2.absdiff(small, self._earlier[0]).max(-1)
         changed = np.count_nonzero(level > self._config.moving_level)
         return bool(changed > self._config.moving_share * level.size)
 

@@ -14,6 +14,7 @@ from robojackson.files.table_file import Columns, Facts, TableFile
 from robojackson.files.table_types import F64, I32, Column, TableSchema
 from robojackson.motion.landmark_track import LANDMARKS, LandmarkTrack
 
+USUAL_FPS = 30.0
 STABILITY_SCORE = TableSchema(
     "StabilityScore",
     "clip",
@@ -52,7 +53,8 @@ class Stability(TableFile):
         jitter: J, normalised image units, summed over the clip.
         stability_score: M + J; lower is steadier.
         missing_joints_per_frame, jitter_per_frame: M and J divided by the number of frames.
-        score_per_second: M + J divided by the length of the clip, 1/s: the sum favours short clips.
+        score_per_second: M as of thirty frames a second plus J, divided by the length of the clip,
+            1/s: the sum favours short clips and low frame rates.
     """
 
     SCHEMA = STABILITY_SCORE
@@ -90,7 +92,7 @@ def stability(track: LandmarkTrack, config: StabilityConfig) -> Stability:
         stability_score=missing + moved,
         missing_joints_per_frame=missing / max(frames, 1),
         jitter_per_frame=moved / max(frames, 1),
-        score_per_second=(missing + moved) * track.fps / max(frames, 1),
+        score_per_second=(missing * USUAL_FPS + moved * track.fps) / max(frames, 1),
     )
 
 

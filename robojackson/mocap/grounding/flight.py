@@ -1,6 +1,8 @@
 """Detect flight of a body: free fall, and jumps from the last to the first contact. World z up;
 metres."""
 
+import math
+
 import numpy as np
 from jaxtyping import Float
 
@@ -56,18 +58,28 @@ def ballistic(
     flying = np.zeros(len(height), bool)
     if not falling.any():
         return flying
-    smooth = lowpass(height, fps, FALL_CUTOFF_HZ)
-    downward = np.gradient(np.gradient(smooth)) < 0.0
-    margin = max(round(FLIGHT_MARGIN_S * fps), 1)
-    for start, end in stretches(downward):
+    acceleration = np.gradient(np.gradient(lowpass(height, fps, FALL_CUTOFF_HZ)))
+    frames, margin = np.arange(len(height)), FLIGHT_MARGIN_S * fps
+    for start, end in stretches(acceleration < 0.0):
         if not falling[start:end].any():
             continue
-        first, last = max(start - margin, 0), min(end + margin, len(height))
-        ground = max(lowest[first], lowest[last - 1])
-        rise = GRAVITY / 8.0 * ((last - first) / fps) ** 2
-        if lowest[first:last].max() - ground > RISE_SHARE * rise:
-            flying[first:last] = True
+        left = _zero_before(acceleration, start) - margin
+        landed = _zero_before(acceleration, end) + margin
+        ground = np.interp([left, landed], frames, lowest).max()
+        rise = GRAVITY / 8.0 * ((landed - left) / fps) ** 2
+        inside = slice(max(math.ceil(left), 0), math.floor(landed) + 1)
+        if lowest[inside].max() - ground > RISE_SHARE * rise:
+            flying[inside] = True
     return flying
+
+
+def _zero_before(values: Float[np.ndarray, " T"], frame: int) -> float:
+    """Return where a line through a frame and the one before it is zero, in frames; a jump's time
+    enters its rise squared, so that whole frames would decide by the frame rate."""
+    if not 0 < frame < len(values):
+        return frame - 0.5
+    before, after = values[frame - 1], values[frame]
+    return float(frame - 1 + before / (before - after))
 
 
 def flight(

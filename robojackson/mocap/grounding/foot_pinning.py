@@ -58,9 +58,10 @@ def root_correction(
     Minimises over the clip, (x, y) being the shift: the step of planted points over `slip`, second
     differences over `wobble` (both in proportion to the time between frames, and to its square, so
     that every frame rate has the same minimum), x over the camera's spread in depth, and y minus
-    x's component along the ray over its spread across: a person who is further away than estimated is further aside
-    too, or he would move in the image. A foot that slides along the ray looks planted; so where
-    contacts would move the body further than `leash_m` from the track, the track dominates.
+    x's component along the ray over its spread across: a person who is further away than estimated
+    is further aside too, or he would move in the image. A foot that slides along the ray looks
+    planted; so where contacts would move the body further than `leash_m` from the track, the track
+    dominates.
 
     Args:
         feet: Foot points, world axes.

@@ -107,6 +107,7 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     if len(height) < SHORTEST_FLIGHT:
         return states
+    height = lowpass(height, fps, air.FALL_CUTOFF_HZ)
     falls = np.gradient(np.gradient(height)) * fps**2 < -ground.GRAVITY / 2.0
     carried, lowest = np.array(states), body.feet[..., 2].argmin(1)
     for start, end in feet.stretches((states == AIR).all(1)):

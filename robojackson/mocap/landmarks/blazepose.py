@@ -37,8 +37,9 @@ FACING_FACTOR = 2.0
 SWAP_FPS = 15.0
 """At lower frame rates a turn looks like an exchange (10 of 26 frames of a dancer at 8 Hz): there
 an exchange also needs shoulders and hips that face the other way from one frame to the next."""
-FEWEST_FPS = 6.0
-"""Frame rate below which an exchange cannot be distinguished from a turn."""
+FEWEST_FPS = 9.0
+"""Frame rate below which an exchange cannot be distinguished from a turn: at 6 to 8.5 up to half of
+the frames of a dancer whose sides are right are exchanged, at 9 and 10 none."""
 FACING_PRIOR = 0.03
 """Cost of a frame with exchanged sides at low frame rates, half turns."""
 
@@ -190,8 +191,8 @@ def swapped_frames(landmarks: Landmarks, fps: float) -> np.ndarray:
 
     Each frame is kept or exchanged; a step costs the mean displacement of the body's landmarks
     (image at the person's scale and depth, metres) or, where frames are far apart, the turn of
-    shoulders and hips. Time with exchanged sides costs a little more, and most where the frames are near
-    and the face was detected towards the camera: sides are exchanged in views from behind.
+    shoulders and hips. Time with exchanged sides costs a little more, and most where the frames are
+    near and the face was detected towards the camera: sides are exchanged in views from behind.
     """
     if fps < FEWEST_FPS:
         return np.zeros(len(landmarks.image), bool)

@@ -155,6 +155,17 @@ def test_by_second_a_short_clip_is_not_favoured() -> None:
     assert candidate_ranking.order(scores, FilterConfig()) == ["whole", "shaky"]
 
 
+def test_the_score_a_second_does_not_count_frames() -> None:
+    """The same clip at 60 frames a second, a quarter of its landmarks missing."""
+    rng = np.random.default_rng(0)
+    marks = np.sin(np.linspace(0.0, 6.0, 240))[:, None, None] * np.ones((1, 33, 3)) / 10
+    seen = np.repeat(rng.uniform(size=(120, 33)) > 0.25, 2, axis=0).astype(float)
+    fast = LandmarkTrack(60.0, 64, 48, marks, marks, seen)
+    slow = LandmarkTrack(30.0, 64, 48, marks[::2], marks[::2], seen[::2])
+    found = [stability(track, StabilityConfig()).score_per_second for track in (fast, slow)]
+    assert found[0] == pytest.approx(found[1], rel=0.01)
+
+
 @pytest.mark.medium
 def test_a_clip_without_a_person_comes_last_however_low_its_score(assessed: Assessed) -> None:
     order = candidate_ranking.order({n: j.stability for n, j in assessed.items()}, FilterConfig())

@@ -104,8 +104,8 @@ def test_a_short_clip_has_no_frame_twice_and_none_outside(frames: int) -> None:
     assert len(chosen) == min(frames, 4)
 
 
-def changes_of(images: list[np.ndarray]) -> Changes:
-    seen = Changes(30.0, CutConfig())
+def changes_of(images: list[np.ndarray], fps: float = 30.0) -> Changes:
+    seen = Changes(fps, CutConfig())
     for image in images:
         seen.add_frame(image)
     return seen
@@ -129,6 +129,18 @@ def test_a_still_does_not_move() -> None:
 def test_a_film_moves_in_every_frame() -> None:
     images = [np.roll(np.repeat(noise()[..., None], 3, -1), 5 * i, 1) for i in range(10)]
     assert changes_of(images).moving_share == 1.0
+
+
+@pytest.mark.parametrize(("repeated", "fps"), [(4, 60.0), (5, 120.0), (8, 120.0)])
+def test_a_film_whose_file_repeats_its_pictures_moves(repeated: int, fps: float) -> None:
+    images = [np.roll(np.repeat(noise()[..., None], 3, -1), 5 * i, 1) for i in range(10)]
+    doubled = [image for image in images for _ in range(repeated)]
+    assert changes_of(doubled, fps).moving_share > 0.8
+
+
+def test_a_slideshow_moves_seldom() -> None:
+    images = [scene(20 + 10 * slide, slide % 3) for slide in range(4) for _ in range(30)]
+    assert changes_of(images).moving_share < 0.15
 
 
 def test_the_noise_of_an_encoder_is_no_motion() -> None:

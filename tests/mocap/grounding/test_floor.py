@@ -54,6 +54,22 @@ def test_a_jump_is_ballistic_as_long_as_it_lasts(height_m: float) -> None:
     assert abs(found[-1] - true[-1]) <= 2
 
 
+@pytest.mark.parametrize("fps", [20.0, 24.0, 25.0, 50.0, 60.0])
+def test_a_small_jump_is_found_at_every_frame_rate(fps: float) -> None:
+    """17 cm, .37 s: push-off, flight and landing, in twenty phases to the frames."""
+    time = np.arange(-3600, 3600) / 2400.0
+    flight, push, speed = 0.372, 0.25, 9.81 * 0.186
+    force = np.where(np.abs(np.abs(time) - (flight + push) / 2.0) < push / 2.0, speed / push, 0.0)
+    force[np.abs(time) < flight / 2.0] = -9.81
+    height = np.cumsum(np.cumsum(force)) / 2400.0**2
+    inside = np.clip(time, -flight / 2.0, flight / 2.0)
+    rise = speed * (inside + flight / 2.0) - 4.905 * (inside + flight / 2.0) ** 2
+    for phase in np.arange(20) / 20.0:
+        seen = (np.arange(2.6 * fps) + phase) / fps - 1.3
+        body, feet = (lowpass(np.interp(seen, time, each), fps, 4.0) for each in (height, rise))
+        assert air.ballistic(body, feet, fps).any()
+
+
 def test_a_person_who_drops_into_a_squat_does_not_jump() -> None:
     time = np.arange(60) / 30.0
     height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
