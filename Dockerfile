@@ -5,7 +5,7 @@ FROM python:3.11-slim-bookworm
 ENV DEBIAN_FRONTEND=noninteractive PIP_NO_CACHE_DIR=1 PYTHONUNBUFFERED=1
 WORKDIR /app
 
-RUN useradd --create-home --uid 10001 jackson && chown jackson:jackson /app
+RUN useradd --create-home --home-dir /srv/jackson --uid 10001 jackson && chown jackson:jackson /app
 
 # System libraries first: they change least. bootstrap.sh lists those that are missing; pg_dump and
 # pg_restore (of the major version of docker-compose.yml's PostgreSQL) are for backup and restore.
@@ -16,9 +16,15 @@ RUN apt-get update -qq \
     && rm -rf /var/lib/apt/lists/*
 
 USER jackson
+# Volumes are mounted here; an empty one gets the owner of the folder.
+RUN mkdir -p ~/.cache/robojackson
+
+# What is installed depends on these files alone: a changed module does not install it again.
 ARG TORCH_INDEX=""
+COPY --chown=jackson:jackson pyproject.toml constraints.txt ./
+RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=app,fast,s3 sh tools/bootstrap.sh dependencies
 COPY --chown=jackson:jackson . .
-RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=app,fast,s3 sh tools/bootstrap.sh install
+RUN .venv/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --editable .
 
 # Last: it changes with every build. Tables record which commit made them; the image has no git.
 ARG GIT_COMMIT=""

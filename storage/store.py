@@ -14,9 +14,9 @@ from pathlib import Path
 from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree, digest_of, in_one_line
 from robojackson.files.local_folder import LocalFolder, Place, user_cache
+from robojackson.files.places import place_at
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from storage.artifact import Artifact
-from storage.places import place_at
 
 VARIABLE = "ROBOJACKSON_STORE"
 DEFAULT_ROOT = "store"

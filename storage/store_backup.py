@@ -12,9 +12,9 @@ import fsspec
 from robojackson.errors import BackupFailed
 from robojackson.files.file_tree import in_one_line
 from robojackson.files.local_folder import LocalFolder
+from robojackson.files.places import Remote
 from storage.backup import Backups, Content, Dump, Manifest
 from storage.backup_progress import Progress, Report, each_finished, megabytes
-from storage.places import Remote
 from storage.prefect_database import Database
 from storage.store import Store
 from storage.store_listing import entries, key_of

@@ -10,7 +10,7 @@ import fsspec
 from robojackson.errors import BackupFailed
 from robojackson.files.file_tree import in_one_line
 from robojackson.files.local_folder import TEMPORARY, LocalFolder
-from storage.places import Remote
+from robojackson.files.places import Remote
 from storage.prefect_database import Database
 from storage.sqlite_database import SQLite
 from storage.store import Store

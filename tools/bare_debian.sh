@@ -7,9 +7,10 @@
 # with PIP_, SSL_ or TORCH_, which is handed in. Certificates that this machine trusts besides Debian's are trusted
 # inside. FOLDER stays; a system that is in it already is used again.
 set -eu
-cd "$(dirname "$0")/.."
 SUITE=${1:?usage: bare_debian.sh bookworm|trixie [FOLDER]}
 FOLDER=${2:-$(mktemp -d)/$SUITE}
+case $FOLDER in /*) ;; *) FOLDER=$PWD/$FOLDER ;; esac # of the folder where the command was given
+cd "$(dirname "$0")/.."
 MIRROR=${MIRROR:-http://deb.debian.org/debian}
 DANCE=${DANCE---minutes 4}
 TESTS=${TESTS-test-fast}
@@ -31,11 +32,12 @@ mount_in() { # the source, the place inside
 
 inside() {
     handed=$(env | sed -n 's/^\(\(PIP\|SSL\|TORCH\)_[A-Z_]*\)=.*/\1/p')
-    words="env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive"
-    for name in $handed; do
-        words="$words $name=$(printenv "$name")"
+    set -- sh -c "cd /robojackson && $1"
+    for name in $handed; do # a value may have spaces: two indexes are one PIP_EXTRA_INDEX_URL
+        set -- "$name=$(printenv "$name")" "$@"
     done
-    chroot "$FOLDER" $words sh -c "cd /robojackson && $1"
+    set -- PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"
+    chroot "$FOLDER" env -i "$@"
 }
 
 step() { # a name, a command inside

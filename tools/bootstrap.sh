@@ -3,6 +3,8 @@
 #   bootstrap.sh missing   print the apt packages that this machine lacks, on one line
 #   bootstrap.sh check     one sentence and exit 1 when something is lacking, before any work
 #   bootstrap.sh install   create .venv or update it; does nothing when it is
+#   bootstrap.sh dependencies   create .venv with all that RoboJackson needs and without RoboJackson: what the
+#                          image is built with reads pyproject.toml and constraints.txt alone
 # Environment: PYTHON (an interpreter 3.11, 3.12 or 3.13; by default the first of these that is here
 # and can make an environment), TORCH_INDEX (where torch comes from), EXTRAS (which of pyproject.toml's
 # optional dependencies; the image leaves `dev` out).
@@ -98,10 +100,57 @@ require_room() {
     exit 1
 }
 
-# Whether the environment is there, of a Python of ours and of PYTHON's version where that is given.
+# Whether the environment is there with pip (an interrupted first `make` leaves one without), of a Python of ours
+# and of PYTHON's version where that is given.
 has_environment() {
     is_python "$VENV/bin/python" || return 1
+    "$VENV/bin/python" -c 'import pip' 2>/dev/null || return 1
     [ -z "${PYTHON:-}" ] || [ "$(version "$PYTHON")" = "$(version "$VENV/bin/python")" ]
+}
+
+# The requirements of pyproject.toml with those of EXTRAS, one a line.
+requirements() {
+    "$VENV/bin/python" - "$EXTRAS" <<'END'
+import sys, tomllib
+with open("pyproject.toml", "rb") as file:
+    project = tomllib.load(file)["project"]
+optional = project["optional-dependencies"]
+for group in (project["dependencies"], *(optional[name] for name in sys.argv[1].split(","))):
+    print(*group, sep="\n")
+END
+}
+
+environment() {
+    has_environment && return 0
+    require_room
+    python=$(find_python)
+    say "creating $VENV with Python $(version "$python")"
+    rm -rf "$VENV"
+    "$python" -m venv "$VENV"
+}
+
+# Install torch, what is given to pip, pinned, and one build of OpenCV.
+fill() {
+    pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
+    say "torch $(pinned torch) (some minutes$([ -n "${TORCH_INDEX:-}" ] || echo "; $CUDA"))"
+    # First and alone: later packages would install a CUDA build of several gigabytes.
+    $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
+    say "the rest"
+    $pip install --constraint constraints.txt "$@"
+    # MediaPipe and scenedetect install two more OpenCV builds; all three share one folder, and the
+    # one with windows needs libraries that a server has not.
+    say "headless OpenCV alone"
+    $pip uninstall --yes opencv-python opencv-contrib-python
+    $pip install --no-deps --force-reinstall \
+        "opencv-python-headless==$(pinned opencv-python-headless)"
+}
+
+dependencies() {
+    check
+    environment
+    requirements >"$VENV/requirements.txt"
+    fill --requirement "$VENV/requirements.txt"
+    say "done, without RoboJackson itself"
 }
 
 install() {
@@ -109,33 +158,16 @@ install() {
     if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(expected)" ] && has_environment; then
         return 0
     fi
-    if ! has_environment; then
-        require_room
-        python=$(find_python)
-        say "creating $VENV with Python $(version "$python")"
-        rm -rf "$VENV"
-        "$python" -m venv "$VENV"
-    fi
-    pip="$VENV/bin/python -m pip --disable-pip-version-check --quiet"
-    say "torch $(pinned torch) (some minutes$([ -n "${TORCH_INDEX:-}" ] || echo "; $CUDA"))"
-    # First and alone: later packages would install a CUDA build of several gigabytes.
-    $pip install ${TORCH_INDEX:+--index-url "$TORCH_INDEX"} "torch==$(pinned torch)"
-    say "the rest"
-    $pip install --constraint constraints.txt --editable ".[$EXTRAS]"
-    # MediaPipe and scenedetect install two more OpenCV builds; all three share one folder, and the
-    # one with windows needs libraries that a server has not.
-    say "headless OpenCV alone"
-    $pip uninstall --yes opencv-python opencv-contrib-python
-    $pip install --no-deps --force-reinstall \
-        "opencv-python-headless==$(pinned opencv-python-headless)"
+    environment
+    fill --editable ".[$EXTRAS]"
     expected >"$STAMP"
     say "done"
 }
 
 case ${1:-} in
-missing | check | install) "$1" ;;
+missing | check | install | dependencies) "$1" ;;
 *)
-    echo "usage: bootstrap.sh missing|check|install" >&2
+    echo "usage: bootstrap.sh missing|check|install|dependencies" >&2
     exit 2
     ;;
 esac

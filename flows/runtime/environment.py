@@ -25,6 +25,7 @@ FIXED = {
 }
 BLOCKS = ("PREFECT_SERVER_REGISTER_BLOCKS_ON_START", "PREFECT_API_BLOCKS_REGISTER_ON_START")
 """Of the temporary server: no run uses blocks, and to register them takes a tenth of its start."""
+LEASES = "PREFECT_SERVER_CONCURRENCY_LEASE_STORAGE"
 
 SERVER = {
     # Relative to the page: right for every host name, port and proxy.
@@ -32,6 +33,9 @@ SERVER = {
     # The newer pages of Prefect 3.8 contact an analytics service with any settings.
     ("PREFECT_SERVER_UI_V2_ENABLED",): "false",
     ("PREFECT_SERVER_UI_SHOW_PROMOTIONAL_CONTENT",): "false",
+    # In files of its home, who holds a slot of a deployment's limit. In its memory, the default, a
+    # restart forgets it: Prefect then ends the nightly refresh that runs, and its slot stays taken.
+    (LEASES,): "prefect.server.concurrency.lease_storage.filesystem",
 }
 """Names of a variable of the server, and what it is where none of them is set."""
 

@@ -18,10 +18,17 @@ from prefect.client.schemas.filters import (
 )
 from prefect.client.schemas.objects import TERMINAL_STATES, FlowRun
 
+from robojackson.errors import TrainingCrashed
+
 EVERY_S = 2.0
 """Between two questions, seconds."""
 PATIENCE_S = 600.0
 """How long the server may be away before the runs are given up, seconds."""
+LOOKS = 15
+"""After so many questions, one whether the server still has the runs: one that was deleted never
+ends."""
+MOST = 200
+"""Runs that the server returns at a time."""
 log = logging.getLogger(__name__)
 
 
@@ -36,6 +43,7 @@ class RunWatcher:
         """Return the run as it ended.
 
         Raises:
+            TrainingCrashed: the run was deleted.
             Exception: the server does not answer any more.
         """
         if run.state is not None and run.state.is_final():
@@ -52,10 +60,14 @@ class RunWatcher:
     async def _poll(self) -> None:
         """Poll until no run is waited for; a server that is away for a while is polled again."""
         answered = time.monotonic()
+        looks = 0
         while self._waiting:
             await asyncio.sleep(EVERY_S)
+            looks += 1
             try:
                 found = await _ended(list(self._waiting))
+                if looks % LOOKS == 0:
+                    await self._fail_deleted()
                 answered = time.monotonic()
             except Exception as cause:
                 if time.monotonic() - answered > PATIENCE_S:
@@ -68,6 +80,15 @@ class RunWatcher:
                 if waits is not None and not waits.done():
                     waits.set_result(run)
 
+    async def _fail_deleted(self) -> None:
+        waiting = list(self._waiting)
+        for run_id in set(waiting) - await _existing(waiting):
+            waits = self._waiting.get(run_id)
+            if waits is not None and not waits.done():
+                waits.set_exception(
+                    TrainingCrashed(f"the run {run_id} was deleted from the Prefect server")
+                )
+
     def _give_up(self, cause: Exception) -> None:
         for waits in self._waiting.values():
             if not waits.done():
@@ -75,8 +96,19 @@ class RunWatcher:
 
 
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:
-    """Return the runs that have ended; the server returns at most 200 at a time."""
+    """Return runs that have ended, `MOST` at a time."""
     over = FlowRunFilterStateType(any_=sorted(TERMINAL_STATES))
     criteria = FlowRunFilter(id=FlowRunFilterId(any_=waiting), state=FlowRunFilterState(type=over))
     async with get_client() as client:
         return await client.read_flow_runs(flow_run_filter=criteria)
+
+
+async def _existing(waiting: list[UUID]) -> set[UUID]:
+    """Return those runs that the server has, in any state."""
+    found: set[UUID] = set()
+    async with get_client() as client:
+        for start in range(0, len(waiting), MOST):
+            some = FlowRunFilterId(any_=waiting[start : start + MOST])
+            runs = await client.read_flow_runs(flow_run_filter=FlowRunFilter(id=some), limit=MOST)
+            found |= {run.id for run in runs}
+    return found

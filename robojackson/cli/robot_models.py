@@ -26,9 +26,10 @@ from robojackson.errors import (
     StoreError,
 )
 from robojackson.files.local_folder import sha256_of_file
+from robojackson.files.store_files import share_folder
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription, RobotSource
-from robojackson.robot.mjcf import added_folder, mjcf_path
+from robojackson.robot.mjcf import added_folder, added_key, mjcf_path
 
 _ROOM_MB = 200
 
@@ -42,12 +43,13 @@ def _entry(description: RobotDescription) -> dict[str, object]:
     try:
         model = str(mjcf_path(description))
         return {"robot": description.name, "ready": True, "model": model, "note": ""}
-    except BadConfiguration as cause:
+    except (BadConfiguration, StoreError) as cause:
         return {"robot": description.name, "ready": False, "model": "", "note": str(cause)}
 
 
 def add_robot(name: str) -> dict[str, object]:
-    """Install the model of a robot in the store; an installed one is not changed.
+    """Install the model of a robot in the store, for every machine that works with it; an installed
+    one is not changed.
 
     Raises:
         BadConfiguration: The robot needs no download.
@@ -68,6 +70,8 @@ def add_robot(name: str) -> dict[str, object]:
         with _one_line(folder):
             _fetch(source, folder)
         model, made = mjcf_path(description), True
+    entry = model.relative_to(folder).as_posix()
+    made = share_folder(added_key(description), entry) or made
     return {"robot": name, "model": str(model), "added": made, "licence": source.licence}
 
 

@@ -6,14 +6,13 @@ same name already, ours is `keypoint/NAME`.
 
 import hashlib
 import importlib.util
-import os
 from pathlib import Path
 
 import mujoco
 
 from robojackson.errors import BadConfiguration
-from robojackson.files.local_folder import folder_of, user_cache
 from robojackson.files.memory_limit import limited_memory
+from robojackson.files.store_files import copy_folder_here, files_here, is_whole
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.model_files import (
     FAULTS,
@@ -26,9 +25,10 @@ from robojackson.robot.model_files import (
 from robojackson.robot.names import known, where
 from robojackson.robot.physics import apply_physics, is_plane
 
-STORE = "ROBOJACKSON_STORE"
 ADDED = "store"
 """Prefix of an `mjcf` that `robojackson robots add` unpacks."""
+FOLDER = "robots"
+"""Where a store has the models of added robots, a folder each."""
 _OURS = "keypoint/"
 
 
@@ -39,16 +39,21 @@ def site_of(model: mujoco.MjModel, key: str) -> int:
 
 
 def robots_folder() -> Path:
-    """Return where added robots are kept: inside the store, or in the cache where that is no
-    folder."""
-    folder = folder_of(os.environ.get(STORE) or "store")
-    return (folder or user_cache()) / "robots"
+    """Return where added robots are on this machine: inside the store, or in the cache where the
+    store is no folder."""
+    return files_here() / FOLDER
+
+
+def added_key(description: RobotDescription) -> str:
+    """Return the key of the folder in a store where `robojackson robots add` puts the model of a
+    robot."""
+    shared = description.source.shared_folder if description.source else ""
+    return f"{FOLDER}/{shared or description.name}"
 
 
 def added_folder(description: RobotDescription) -> Path:
-    """Return where `robojackson robots add` puts the model of a robot."""
-    shared = description.source.shared_folder if description.source else ""
-    return robots_folder() / (shared or description.name)
+    """Return where the model of an added robot is on this machine."""
+    return files_here() / added_key(description)
 
 
 def mjcf_path(description: RobotDescription) -> Path:
@@ -71,12 +76,14 @@ def mjcf_path(description: RobotDescription) -> Path:
 
 def _added(description: RobotDescription, inside: str) -> Path:
     name, path = description.name, added_folder(description) / inside
+    pinned = description.source.model_sha256 if description.source else None
+    if not is_whole(path, pinned):  # another machine may have added it
+        copy_folder_here(added_key(description), inside, pinned)
     if not path.is_file():
         raise BadConfiguration(
             f"robot {name!r}: its model is not here ({path}); run: robojackson robots add {name}"
         )
-    pinned = description.source and description.source.model_sha256
-    if pinned and hashlib.sha256(path.read_bytes()).hexdigest() != pinned:
+    if not is_whole(path, pinned):
         raise BadConfiguration(
             f"robot {name!r}: {path} has been altered; run: robojackson robots add {name}"
         )

@@ -3,6 +3,9 @@
 import errno
 import os
 import random
+import subprocess
+import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -39,11 +42,15 @@ def test_a_line_has_the_slope_that_it_has() -> None:
 
 
 def test_command_worker_and_others_are_killed_equally_often() -> None:
-    me = os.getpid()
-    found = [Found(me, "command", Path()), *(Found(n, "other", Path()) for n in range(-9, 0))]
-    rng = random.Random(0)
-    drawn = [_victim(rng, me, found).command for _ in range(400)]
-    assert 160 < drawn.count("command") < 240
+    """However many others there are: nine are each drawn nine times more seldom than the worker."""
+    me, rng = os.getpid(), random.Random(0)
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        others = [Found(number, "other", Path()) for number in range(-9, 0)]
+        found = [Found(me, "command", Path()), Found(child.pid, "worker", Path()), *others]
+        drawn = Counter(_victim(rng, me, found).command for _ in range(600))
+        child.kill()
+    assert drawn.keys() == {"command", "worker", "other"}
+    assert all(150 < count < 250 for count in drawn.values()), drawn
 
 
 @pytest.mark.parametrize("nth", range(3))

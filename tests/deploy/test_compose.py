@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
+from flows.runtime.environment import LEASES, SERVER
+from robojackson.cli.lifetime.process_group import SECONDS_TO_SAVE
 from tools.stack.compose_stack import COMPOSE, PASSWORDS, ROLES, passwords
 from tools.stack.service import StackError, interpolate
 
@@ -94,6 +96,44 @@ def test_every_service_that_stays_has_a_health_check() -> None:
 def test_data_is_in_named_volumes() -> None:
     mounts = [v for s in SERVICES.values() for v in s.get("volumes", []) if isinstance(v, str)]
     assert {mount.split(":")[0] for mount in mounts} == set(FILE["volumes"])
+
+
+CACHE = "/srv/jackson/.cache/robojackson"
+"""Where a container keeps what belongs to its machine, as the store is no folder."""
+
+
+def test_the_workers_of_a_machine_share_their_checkpoints_and_a_new_container_has_them() -> None:
+    mounts = {name: SERVICES[name]["volumes"] for name in ("flow-worker", "trainer")}
+    assert mounts == {"flow-worker": [f"work:{CACHE}"], "trainer": [f"work:{CACHE}"]}
+
+
+def test_who_holds_a_slot_is_known_after_a_restart_of_the_server() -> None:
+    """Else the nightly refresh would be ended by it."""
+    server = SERVICES["prefect-server"]
+    assert server["volumes"] == [f"server:{CACHE}"]
+    assert server["environment"][LEASES] == SERVER[(LEASES,)]
+    assert "PREFECT_HOME" not in server["environment"]  # `robojackson server` has it in the cache
+
+
+def test_the_user_of_the_image_owns_what_volumes_are_mounted_on() -> None:
+    text = (ROOT / "Dockerfile").read_text()
+    assert f"--home-dir {CACHE.partition('/.cache')[0]} " in text
+    lines = text.splitlines()
+    assert lines.index("RUN mkdir -p ~/.cache/robojackson") > lines.index("USER jackson")
+
+
+@pytest.mark.parametrize("name", ["flow-worker", "trainer"])
+def test_a_worker_that_is_stopped_has_time_to_save(name: str) -> None:
+    assert int(SERVICES[name]["stop_grace_period"].removesuffix("s")) > SECONDS_TO_SAVE
+
+
+@pytest.mark.parametrize(("given", "count"), [({}, "1"), ({"TRAINERS": "4"}, "4")])
+def test_the_number_of_trainers_is_in_env(given: dict[str, str], count: str) -> None:
+    """An option of one command would be gone with the next."""
+    made = interpolate(SERVICES["trainer"], {**passwords(), **given})
+    assert made["deploy"]["replicas"] == count
+    text = (ROOT / "docs" / "deployment.md").read_text() + COMPOSE.read_text()
+    assert [line for line in text.splitlines() if "docker" in line and "--scale" in line] == []
 
 
 @pytest.mark.parametrize("name", SERVICES)

@@ -3,6 +3,7 @@
 import asyncio
 import inspect
 import os
+import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +28,8 @@ from tasks.runtime.stage import stage
 
 ROOT = Path(__file__).parents[2]
 DEPLOYMENTS = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
+DANCE_GB = 4
+"""Memory of a pass with training (docs/platforms.md)."""
 FREQUENCY = "PREFECT_FLOWS_HEARTBEAT_FREQUENCY"
 OLDER = ProcessWorker.get_default_base_job_template()
 OLDER["variables"]["properties"]["env"]["default"] = {"CUDA_VISIBLE_DEVICES": "1"}
@@ -48,6 +51,16 @@ def test_a_deployment_is_a_flow_with_the_parameters_it_gives(deployment: dict[st
 def test_missed_nights_do_not_run_at_once() -> None:
     (nightly,) = (each for each in DEPLOYMENTS if each["name"] == "nightly")
     assert nightly["concurrency_limit"] == {"limit": 1, "collision_strategy": "CANCEL_NEW"}
+
+
+def test_dances_that_train_fit_into_the_memory_of_the_flow_worker() -> None:
+    """Each trains in the worker itself; one that comes meanwhile waits."""
+    (dance,) = (each for each in DEPLOYMENTS if each["entrypoint"] == "flows.dance.dance")
+    assert dance["concurrency_limit"]["collision_strategy"] == "ENQUEUE"
+    worker = yaml.safe_load((ROOT / "docker-compose.yml").read_text())["services"]["flow-worker"]
+    memory = worker["deploy"]["resources"]["limits"]["memory"]
+    (gigabytes,) = re.findall(r"FLOW_WORKER_MEMORY:-(\d+)g", memory)
+    assert dance["concurrency_limit"]["limit"] * DANCE_GB <= int(gigabytes)
 
 
 def test_the_refresh_runs_every_night_and_by_hand() -> None:

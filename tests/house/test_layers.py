@@ -106,7 +106,7 @@ def house(tmp_path: Path) -> Path:
         ("robojackson/motion/certificate.py", "import robojackson.rl.policy", "inside the library"),
         ("robojackson/formats/bvh.py", "import robojackson.clips.video", "inside the library"),
         ("robojackson/cli/diagnosis/doctor.py", "import flows.dance", "flows decide"),
-        ("storage/places.py", "import tasks.study_cell", "flows decide"),
+        ("storage/store.py", "import tasks.study_cell", "flows decide"),
         ("robojackson/rl/policy.py", "import prefect", "know Prefect"),
         ("flows/cli/commands.py", "import prefect", "import it only when they run"),
         ("robojackson/rl/tqc/trainer.py", "import robojackson.rl.tqc.trainers", "no circle"),

@@ -13,6 +13,7 @@ from fsspec.implementations.memory import MemoryFileSystem
 from moto.server import ThreadedMotoServer
 
 from robojackson.errors import StoreError
+from robojackson.files.places import PART
 from storage.artifact import Artifact
 from storage.store import Store
 
@@ -27,6 +28,9 @@ class FullDisk(MemoryFileSystem):
     def pipe_file(self, path: str, value: bytes, mode: str = "overwrite", **kwargs: object) -> None:
         super().pipe_file(path, value[: len(value) // 2], mode)
         raise OSError(errno.ENOSPC, "No space left on device")
+
+    def put_file(self, lpath: str, rpath: str, **kwargs: object) -> None:
+        self.pipe_file(rpath, Path(lpath).read_bytes())
 
 
 fsspec.register_implementation("fulldisk", FullDisk, clobber=True)
@@ -70,6 +74,36 @@ def test_a_local_file_is_put_like_bytes(store: Store, tmp_path: Path) -> None:
     (tmp_path / "clip.mp4").write_bytes(b"frames")
     artifact = store.save("video", "clip.mp4", tmp_path / "clip.mp4")
     assert artifact == store.save("video", "clip.mp4", b"frames")
+
+
+@pytest.mark.medium
+def test_a_large_file_goes_to_an_object_store_in_parts(
+    s3_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A restore puts eight at a time: whole ones would fill the memory of its container."""
+    store, path = Store(f"{s3_url}/{tmp_path.name}"), tmp_path / "video.mp4"
+    with path.open("wb") as file:
+        file.truncate(5 * PART // 2)
+    sent: list[int] = []
+    call = store.place._system._call_s3
+
+    async def noted(method: str, *args: object, **given: object) -> object:
+        sent.append(len(given.get("Body", b"")))
+        return await call(method, *args, **given)
+
+    monkeypatch.setattr(store.place._system, "_call_s3", noted)
+    monkeypatch.setattr(Path, "read_bytes", lambda path: pytest.fail("it was read whole"))
+    artifact = store.put("video.mp4", path)
+    assert [size for size in sent if size] == [PART, PART, PART // 2]
+    assert store.sha256("video.mp4") == artifact.sha256
+
+
+def test_a_file_that_is_cut_off_on_its_way_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"12345678")
+    store = Store("fulldisk://dances")
+    with pytest.raises(StoreError, match="No space left"):
+        store.put("a/x", tmp_path / "a")
+    assert FullDisk.store == {}
 
 
 def test_a_second_put_replaces_the_first(store: Store) -> None:

@@ -6,10 +6,16 @@ from robojackson.errors import BadPolicy, StoreError
 from robojackson.files.download import download
 from robojackson.files.file_tree import FileTree, in_one_line
 from robojackson.files.local_folder import sha256_of_file
+from robojackson.files.store_files import copy_file_here, is_whole, share_file
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
 from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
-from robojackson.rl.trackers.tracker_file import is_present, open_tracker, tracker_path
+from robojackson.rl.trackers.tracker_file import (
+    is_present,
+    open_tracker,
+    tracker_key,
+    tracker_path,
+)
 
 LOCK = ".add.lock"
 Entry = dict[str, str | bool]
@@ -37,7 +43,8 @@ def tracker_lines(found: list[Entry]) -> list[str]:
 
 
 def add_tracker(name: str, file: Path | None = None) -> Entry:
-    """Install the file of a tracker in the store; the expected file is not downloaded again.
+    """Install the file of a tracker in the store, for every machine that works with it; the
+    expected file is not downloaded again.
 
     Args:
         file: A copy on this machine, instead of a download.
@@ -49,9 +56,9 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
         StoreError: the store cannot be written.
     """
     tracker = describe_tracker(name)
-    pinned, path = tracker.file, tracker_path(tracker)
+    pinned, path, key = tracker.file, tracker_path(tracker), tracker_key(tracker)
     entry = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
-    if pinned is None or pinned.url is None or path is None:
+    if pinned is None or pinned.url is None or path is None or key is None:
         if file is not None:
             raise BadPolicy(f"tracker {name!r} takes no file: it ships; leave out --file")
         open_tracker(tracker)
@@ -61,14 +68,16 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
     with in_one_line(f"cannot write {path.parent}"):
         path.parent.mkdir(parents=True, exist_ok=True)
     with locked(path.parent, LOCK, A_MOMENT, "another download of a tracker"):
-        if path.is_file() and sha256_of_file(path) == pinned.sha256:
-            return {**entry, "added": False}
+        copy_file_here(key, pinned.sha256)
+        if is_whole(path, pinned.sha256):
+            return {**entry, "added": share_file(key)}
         if file is not None:
             _require_pinned(name, pinned, file)
             FileTree(path.parent).write(path.name, file)
         else:
             with in_one_line(f"cannot write {path}"):
                 download(pinned.url, path, pinned.size, pinned.sha256)
+        share_file(key)
     open_tracker(tracker)  # report a file that cannot be run now
     return {**entry, "added": True}
 

@@ -1,14 +1,17 @@
 """Waiting for runs on workers: one question for all of them, and patience with the server."""
 
 import asyncio
-from typing import Any
 from uuid import UUID, uuid4
 
 import pytest
+from prefect import flow
+from prefect.client.orchestration import get_client
+from prefect.client.schemas.filters import FlowRunFilter
 from prefect.client.schemas.objects import FlowRun
 from prefect.states import Completed, Scheduled
 
 from flows.study import run_watcher
+from robojackson.errors import TrainingCrashed
 
 
 def waiting(count: int) -> list[FlowRun]:
@@ -16,10 +19,14 @@ def waiting(count: int) -> list[FlowRun]:
 
 
 class Server:
-    """A server whose runs end one more a question, and that is away for the first ones."""
+    """A server whose runs end one more a question, and that is away for the first ones.
 
-    def __init__(self, away: int = 0) -> None:
+    Runs that were deleted are neither over nor there.
+    """
+
+    def __init__(self, away: int = 0, deleted: frozenset[UUID] = frozenset()) -> None:
         self.away, self.calls = away, 0
+        self.deleted = deleted
         self.over: set[UUID] = set()
 
     async def __call__(self, ids: list[UUID]) -> list[FlowRun]:
@@ -27,7 +34,11 @@ class Server:
         if self.calls <= self.away:
             raise ConnectionError("no server")
         self.over.add(min(ids))
+        self.over -= self.deleted
         return [FlowRun(id=i, flow_id=uuid4(), state=Completed()) for i in ids if i in self.over]
+
+    async def existing(self, ids: list[UUID]) -> set[UUID]:
+        return set(ids) - self.deleted
 
 
 @pytest.fixture
@@ -36,8 +47,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def wait_for(runs: list[FlowRun], server: Any, patch: pytest.MonkeyPatch) -> list[FlowRun]:
+def wait_for(runs: list[FlowRun], server: Server, patch: pytest.MonkeyPatch) -> list[FlowRun]:
     patch.setattr(run_watcher, "_ended", server)
+    patch.setattr(run_watcher, "_existing", server.existing)
 
     async def all_of() -> list[FlowRun]:
         ended = run_watcher.RunWatcher()
@@ -73,3 +85,53 @@ def test_a_server_that_stays_away_is_an_error(quick: pytest.MonkeyPatch) -> None
     quick.setattr(run_watcher, "PATIENCE_S", 0.05)
     with pytest.raises(ConnectionError, match="no server"):
         wait_for(waiting(2), Server(away=10**6), quick)
+
+
+def test_a_run_that_was_deleted_fails_and_the_others_end(quick: pytest.MonkeyPatch) -> None:
+    quick.setattr(run_watcher, "LOOKS", 2)
+    runs = waiting(3)
+    gone, server = runs[1].id, Server(deleted=frozenset([runs[1].id]))
+
+    async def each() -> list[FlowRun | BaseException]:
+        watcher = run_watcher.RunWatcher()
+        return await asyncio.gather(*map(watcher.of, runs), return_exceptions=True)
+
+    quick.setattr(run_watcher, "_ended", server)
+    quick.setattr(run_watcher, "_existing", server.existing)
+    first, second, third = asyncio.run(asyncio.wait_for(each(), 20))
+    assert [getattr(run, "id", None) for run in (first, third)] == [runs[0].id, runs[2].id]
+    assert isinstance(second, TrainingCrashed)
+    assert str(second) == f"the run {gone} was deleted from the Prefect server"
+
+
+def test_runs_are_looked_up_two_hundred_at_a_time(quick: pytest.MonkeyPatch) -> None:
+    """The server returns no more, and one that it left out would count as deleted."""
+    ids, requests = [run.id for run in waiting(450)], []
+
+    class Client:
+        async def __aenter__(self) -> "Client":
+            return self
+
+        async def __aexit__(self, *error: object) -> None:
+            pass
+
+        async def read_flow_runs(self, flow_run_filter: FlowRunFilter, limit: int) -> list[FlowRun]:
+            assert flow_run_filter.state is None
+            requests.append((len(flow_run_filter.id.any_), limit))
+            return [FlowRun(id=i, flow_id=uuid4()) for i in flow_run_filter.id.any_]
+
+    quick.setattr(run_watcher, "get_client", Client)
+    assert asyncio.run(run_watcher._existing(ids)) == set(ids)
+    assert requests == [(200, 200), (200, 200), (50, 200)]
+
+
+@pytest.mark.medium
+def test_a_server_has_a_run_until_it_is_deleted(prefect_server: None) -> None:
+    async def look() -> tuple[set[UUID], set[UUID]]:
+        async with get_client() as client:
+            run = await client.create_flow_run(flow(lambda: None, name="nothing"))
+            before = await run_watcher._existing([run.id])
+            await client.delete_flow_run(run.id)
+            return before ^ {run.id}, await run_watcher._existing([run.id])
+
+    assert asyncio.run(look()) == (set(), set())

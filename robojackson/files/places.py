@@ -1,7 +1,8 @@
 """Places of a store: a folder of this machine, or any address that fsspec reaches.
 
 Every write is whole or absent: on a disk a temporary name, fsync, then rename; in an object store
-one PUT; elsewhere a temporary name, then a move. Errors are those of the place; `Store` words them.
+one PUT, or parts that it joins when it has all; elsewhere a temporary name, then a move. Errors are
+those of the place; `FileTree` words them.
 """
 
 import os
@@ -13,6 +14,10 @@ from robojackson.files.local_folder import TEMPORARY, LocalFolder, folder_of, sh
 
 PUT_IS_ATOMIC = frozenset(("s3", "s3a", "gs", "gcs", "abfs", "az", "memory"))
 """fsspec protocols in which a file is there whole or not at all."""
+S3 = frozenset(("s3", "s3a"))
+PART, AT_ONCE = 16 << 20, 2
+"""Bytes of a part of a local file on its way to S3, and parts in memory at a time: by itself s3fs
+reads 500 MB before it sends any, in each of the threads of a restore."""
 
 
 def place_at(root: str) -> "LocalFolder | Remote":
@@ -30,6 +35,8 @@ class Remote:
         spoken = self._system.protocol
         protocols = {spoken} if isinstance(spoken, str) else set(spoken)
         self._put_is_atomic = bool(protocols & PUT_IS_ATOMIC)
+        in_parts = {"chunksize": PART, "max_concurrency": AT_ONCE}
+        self._upload = in_parts if protocols & S3 else {}
 
     def create(self) -> None:
         """Make the bucket or folder."""
@@ -37,16 +44,15 @@ class Remote:
 
     def put(self, key: str, source: Path | bytes) -> None:
         """Write a file, whole or not at all."""
-        data = source if isinstance(source, bytes) else source.read_bytes()
         target = self._path(key)
         if self._put_is_atomic:
-            self._system.pipe_file(target, data)
+            self._send(source, target)
             return
         folder, name = target.rsplit("/", 1)
         unfinished = f"{folder}/{TEMPORARY}{os.getpid()}-{name}"
         self._system.makedirs(folder, exist_ok=True)
         try:
-            self._system.pipe_file(unfinished, data)
+            self._send(source, unfinished)
             self._system.mv(unfinished, target)
         except BaseException:
             self._discard(unfinished)
@@ -85,6 +91,12 @@ class Remote:
 
     def _path(self, key: str) -> str:
         return f"{self._base}/{key}" if key else self._base
+
+    def _send(self, source: Path | bytes, target: str) -> None:
+        if isinstance(source, bytes):
+            self._system.pipe_file(target, source)
+        else:
+            self._system.put_file(str(source), target, **self._upload)
 
     def _discard(self, path: str) -> None:
         if self._system.exists(path):
