@@ -108,6 +108,8 @@ _FORMS: Mapping[str, _Form] = {
     "rollouts": _Form("rollouts"),
 }
 _FLAGS = ("cyclic",)
+_NAMES = ("seed",)
+"""Integers that name something instead of counting it: without separators."""
 
 
 def quantity(key: str, value: Any) -> Quantity:
@@ -125,7 +127,12 @@ def format_value(key: str, value: Any) -> str:
         return "–"
     if not isinstance(value, int | float):
         return str(value)
-    number = decimal(value * form.factor, form.digits) if key in _FORMS else f"{value:,.4g}"
+    if key in _FORMS:
+        number = decimal(value * form.factor, form.digits)
+    elif isinstance(value, int):
+        number = decimal(value, 0) if key not in _NAMES else str(value)
+    else:
+        number = f"{value:,.4g}"
     space = "" if form.unit == "%" else " "
     return f"{number}{space}{form.unit}".strip()
 

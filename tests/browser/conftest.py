@@ -16,6 +16,7 @@ from robojackson.api.robots import load_robot
 from robojackson.body.skeleton import REST_JOINTS
 from robojackson.clips.sound import RATE, Sound
 from robojackson.clips.video import VideoLimits, probe
+from robojackson.metrics.rollout_score import heading_frame, site_error
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
@@ -26,9 +27,11 @@ from robojackson.report.video.encoder import write_video
 from robojackson.report.video.film import VideoConfig
 from robojackson.report.web.shown_run import RecordedRun, shown_run
 from robojackson.rl.config.track_config import ControlConfig
+from robojackson.rl.evaluation.rollouts import Rollouts
 from robojackson.rl.policy import Policy
 from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.model import Robot
+from robojackson.robot.names import PELVIS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -42,6 +45,10 @@ FALLEN = 50
 LYING = np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0
 """Quaternion wxyz of a body that lies on its face."""
 TITLE = "<script>alert(1)</script> \u202emosnart"
+WITHOUT_3D = """(() => { const whole = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    return kind.startsWith('webgl') ? null : whole.call(this, kind, ...more); }; })()"""
+"""A script by which a browser draws no 3D."""
 ARGUMENTS = [
     "--no-sandbox",
     "--enable-unsafe-swiftshader",
@@ -82,6 +89,14 @@ def standing_reference(robot: Robot) -> ReferenceMotion:
         keypoint_names=robot.keypoint_names, contact_names=robot.contact_names,
         scorecard={"keypoint_mm": 7.25, "limit_violations": 0.0, "floor_penetration_mm": 6.0},
     )  # fmt: skip
+
+
+def beside_pelvis(robot: Robot, done: Rollouts) -> np.ndarray:
+    """Return the mean site error of each robot after each step, as tables of an evaluation have
+    it."""
+    pelvis = robot.keypoint_names.index(PELVIS)
+    here = heading_frame(done.points, done.qpos[..., 3:7], pelvis)
+    return site_error(here, heading_frame(done.target, done.target_qpos[..., 3:7], pelvis))
 
 
 def made_policy(robot: Robot) -> Policy:
@@ -170,21 +185,28 @@ def browser() -> Iterator["Browser"]:
 
 @pytest.fixture
 def opened(browser: "Browser") -> Iterator[Callable[..., Opened]]:
-    """Open a file and wait until it can be used; the context is closed after the test."""
+    """Open a file and wait until it can be used; the context is closed after the test.
+
+    `before` is a script that runs ahead of the page's, `options` are of the browser's context.
+    """
     contexts = []
 
-    def open_file(file: Path, width: int = 1600, scheme: str = "light") -> Opened:
+    def open_file(
+        file: Path, width: int = 1600, scheme: str = "light", before: str = "", **options: object
+    ) -> Opened:
         context = browser.new_context(
-            viewport={"width": width, "height": 1000}, color_scheme=scheme
+            viewport={"width": width, "height": 1000}, color_scheme=scheme, **options
         )
         contexts.append(context)
+        if before:
+            context.add_init_script(before)
         found = Opened(context.new_page())
         found.page.set_default_timeout(180_000)
         found.page.on("request", lambda request: found.requests.append(request.url))
         found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
         found.page.on("console", lambda message: _note(found, message.type, message.text))
         found.page.goto(file.as_uri())
-        if found.page.query_selector("#player-data, #dance-data"):
+        if not before and found.page.query_selector("#player-data, #dance-data"):
             found.page.wait_for_selector("[data-ready=yes]")
         return found
 

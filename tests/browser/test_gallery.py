@@ -53,3 +53,18 @@ def test_gallery_filters_and_sorts(opened: Callable[..., Opened], gallery_file: 
     page.evaluate(CHOOSE, ["[data-filter=robot]", "humanoid"])
     assert page.evaluate(SHOWN) == [odd, "hip_shake"]
     assert page.inner_text("#shown") == "2 of 3 dances"
+
+
+def test_what_is_shown_is_what_is_chosen_after_back(
+    opened: Callable[..., Opened], gallery_file: Path
+) -> None:
+    page = opened(gallery_file).page
+    page.select_option("[data-filter=robot]", "humanoid")
+    page.select_option("#sort", "skill")
+    before = page.evaluate(SHOWN)
+    page.goto("about:blank")
+    page.go_back()
+    page.wait_for_timeout(500)
+    assert page.input_value("[data-filter=robot]") == "humanoid"
+    assert page.evaluate(SHOWN) == before
+    assert page.inner_text("#shown") == "2 of 3 dances"

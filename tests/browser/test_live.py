@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from robojackson.rl.evaluation.rollouts import Starts, roll_out
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.fall import Fall
-from tests.browser.conftest import Opened
+from tests.browser.conftest import WITHOUT_3D, Opened, beside_pelvis
 from tests.browser.test_run_page import serious
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
 Open = Callable[..., Opened]
@@ -37,6 +41,20 @@ FELL = """() => { const { dancer, view, show } = robojackson, [pane] = view.pane
   for (let b = 3; b < at.length; b += 3) most = Math.max(most, ...place.set(...at.slice(b, b + 3)).project(pane.camera).toArray().slice(0, 2).map(Math.abs));
   return most; }"""  # noqa: E501
 """How far a fallen robot's bodies are from the middle of the pane; 1 is the edge."""
+CHECKED = "[data-checked=yes]"
+PHONE = {"has_touch": True, "is_mobile": True}
+SET = """([id, value]) => { const slider = document.getElementById(id); slider.value = value;
+  slider.dispatchEvent(new Event('input')); }"""
+STATE = """() => { const { dancer, state } = robojackson, of = (id) => document.getElementById(id).value;
+  return { mode: [of('mode'), dancer.mode], speed: [Number(of('speed')), state.speed], start: [Number(of('phase')), dancer.first],
+    friction: [Number(of('friction')), dancer.model.geom_friction[0] / dancer.friction[0]] }; }"""  # noqa: E501
+"""What each control shows, and what holds."""
+ASIDE = """() => { const { dancer } = robojackson;
+  return [[0, 0], [1, 0], [0.6, 0.8]].map(([along, turn]) => {
+    const state = dancer.state(0), [w, x, y, z] = state.qpos.slice(3, 7), c = Math.cos(turn / 2), s = Math.sin(turn / 2);
+    state.qpos[0] += along; state.qpos.set([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], 3);
+    dancer.mode = 'statue'; dancer.start(0, state); dancer.advance(); return dancer.error; }); }"""  # noqa: E501
+"""Errors of a robot in its place, 1 m aside, and aside and turned."""
 ROOT_ON_SCREEN = """() => { const { dancer, view } = robojackson, [pane] = view.panes, at = dancer.data.xpos;
   view.aim(pane); pane.camera.updateMatrixWorld();
   const place = new THREE.Vector3(at[3], at[4], at[5]).project(pane.camera), box = pane.element.getBoundingClientRect();
@@ -103,6 +121,37 @@ def test_a_drag_moves_the_robot_as_far_as_a_push_of_the_same_impulse(
     assert moved["dragged"] == pytest.approx(moved["pushed"], rel=0.25)
 
 
+def swiped(page: "Page", x: float, y: float) -> list[str]:
+    """Swipe upwards with one finger; return the pointer's events before the finger leaves."""
+    page.evaluate("""() => { scrollTo(0, 0); window.events = [];
+      for (const kind of ['pointerdown', 'pointermove', 'pointercancel']) document.getElementById('orbit').addEventListener(kind, () => events.push(kind), { capture: true }); }""")  # noqa: E501
+    finger = page.context.new_cdp_session(page)
+    for kind, k in (("touchStart", 0), *(("touchMove", k) for k in range(1, 9))):
+        points = [{"x": x, "y": y - 15 * k}]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        page.wait_for_timeout(30)
+    events: list[str] = page.evaluate("events")
+    finger.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.wait_for_timeout(300)
+    return events
+
+
+def test_a_finger_pulls_the_robot_and_scrolls_beside_it(opened: Open, live_file: Path) -> None:
+    page = opened(live_file, 390, **PHONE).page
+    page.wait_for_selector(CHECKED)
+    page.evaluate(PAUSE)
+    page.evaluate("robojackson.again()")
+    page.evaluate("() => { document.querySelector('main').style.minHeight = '3000px'; }")
+    page.wait_for_timeout(500)
+    x, y = page.evaluate(ROOT_ON_SCREEN)
+    pulled = swiped(page, x, y)
+    assert "pointercancel" not in pulled
+    assert pulled.count("pointermove") > 4
+    assert page.evaluate("scrollY") == 0
+    swiped(page, x - 150, y)
+    assert page.evaluate("scrollY") > 20
+
+
 def test_rollouts_survive_and_err_as_in_python(
     opened: Open, live_file: Path, run: RecordedRun
 ) -> None:
@@ -117,7 +166,7 @@ def test_rollouts_survive_and_err_as_in_python(
     done = roll_out(run.robot, clip, driver, starts, horizon, 1, Fall.of(run.robot))
     ours = done.length.astype(float)
     assert abs(theirs[:, 0].mean() - ours.mean()) <= max(1.0, ours.std())
-    apart = np.linalg.norm(done.points - done.target, axis=-1).mean(-1)
+    apart = beside_pelvis(run.robot, done)
     errors = np.array([apart[: max(1, n), i].mean() for i, n in enumerate(done.length)])
     assert abs(theirs[:, 1].mean() - errors.mean()) <= max(0.001, errors.std())
 
@@ -190,3 +239,66 @@ def test_keys_pause_switch_the_dancer_and_start_again(opened: Open, live_file: P
     assert page.evaluate("Math.hypot(...robojackson.dancer.data.qvel.slice(0, 2))") > 0.1
     page.keyboard.press("r")
     assert page.evaluate("robojackson.dancer.danced") == 0
+
+
+def test_keys_work_before_anything_is_in_focus_and_after_a_click_on_the_robot(
+    opened: Open, live_file: Path
+) -> None:
+    page = opened(live_file, 800, reduced_motion="reduce").page
+    page.wait_for_selector(CHECKED)
+    page.keyboard.press("o")
+    assert page.evaluate("robojackson.dancer.mode") == "reference"
+    page.focus("#friction")
+    page.evaluate("robojackson.again()")
+    page.mouse.click(*page.evaluate(ROOT_ON_SCREEN))
+    assert page.evaluate("document.activeElement.id") == "live"
+    page.keyboard.press("o")
+    assert page.evaluate("robojackson.dancer.mode") == "statue"
+
+
+def test_a_dance_stands_where_motion_is_to_be_reduced(opened: Open, live_file: Path) -> None:
+    page = opened(live_file, 400, reduced_motion="reduce").page
+    page.wait_for_selector(CHECKED)
+    page.wait_for_timeout(500)
+    assert page.inner_text("#play") == "Play"
+    assert page.evaluate("[robojackson.state.playing, robojackson.state.steps]") == [False, 0]
+    page.click("#play")
+    page.wait_for_timeout(500)
+    assert page.inner_text("#play") == "Pause"
+    assert page.evaluate("robojackson.state.steps") > 0
+
+
+def test_controls_show_what_holds_after_back(opened: Open, live_file: Path) -> None:
+    page = opened(live_file, 400, reduced_motion="reduce").page
+    page.wait_for_selector(CHECKED)
+    page.select_option("#mode", "statue")
+    for id_, value in (("speed", 0.2), ("friction", 0.5), ("phase", 60)):
+        page.evaluate(SET, [id_, value])
+    page.goto("about:blank")
+    page.go_back()
+    page.wait_for_selector(CHECKED)
+    page.wait_for_timeout(500)
+    for shown, holds in page.evaluate(STATE).values():
+        assert shown == holds
+
+
+@pytest.mark.parametrize(
+    ("before", "reason"),
+    [(WITHOUT_3D, "draws no 3D"), ("delete window.DecompressionStream", "DecompressionStream"),
+     ("delete window.WebAssembly", "WebAssembly")],
+)  # fmt: skip
+def test_the_badge_names_what_a_browser_lacks(
+    opened: Open, live_file: Path, before: str, reason: str
+) -> None:
+    page = opened(live_file, 400, before=before).page
+    page.wait_for_selector("#badge.bad")
+    assert "this browser cannot run the dance" in page.inner_text("#badge")
+    assert reason in page.inner_text("#badge")
+
+
+def test_drift_over_the_floor_is_no_error(opened: Open, live_file: Path) -> None:
+    page = opened(live_file, 400, reduced_motion="reduce").page
+    page.wait_for_selector(CHECKED)
+    here, aside, turned = page.evaluate(ASIDE)
+    assert 0 < here < 0.05
+    assert [aside, turned] == pytest.approx([here, here], rel=0.01)

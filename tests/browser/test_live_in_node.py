@@ -31,7 +31,7 @@ from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
-from tests.browser.conftest import made_policy
+from tests.browser.conftest import beside_pelvis, made_policy
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(900)]
 STEPS, PUSHED_AT, SMALL = 160, 40, np.float32(0.05)
@@ -104,7 +104,7 @@ def in_python(run: RecordedRun, data: Mapping[str, Any], pushes: np.ndarray) -> 
     driver = trained_driver(run.policy, run.robot, run.reference)
     horizon = np.full(RECORDS, STEPS)
     done = roll_out(run.robot, clip, driver, starts, horizon, 1, Fall.of(run.robot), push)
-    apart = np.linalg.norm(done.points - done.target, axis=-1).mean(-1)
+    apart = beside_pelvis(run.robot, done)
     errors = [apart[: max(1, n), i].mean() for i, n in enumerate(done.length)]
     return np.column_stack([done.length, errors])
 

@@ -7,6 +7,7 @@ import numpy as np
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
+from robojackson.report.pages.run_page import PageContent, render
 from robojackson.report.web.player_data import player
 from tests.fixtures.robots import stock
 
@@ -25,3 +26,13 @@ def test_a_robot_that_drifts_over_the_floor_does_not_leave_the_dance(
         titles = {span.title for band in shown.bands for span in band.spans}
         assert ("robot off the dance" in titles) == is_off
         assert (max(error.max() for error in shown.error_m.values()) > 0.1) == is_off
+
+
+def test_a_cut_dance_is_noted_on_its_page(
+    track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion
+) -> None:
+    motion = replace(reference, certificate=None)
+    for most, is_cut in ((0.2, True), (20.0, False)):
+        shown = player(track, sequence, motion, motion.qpos, stock(), 30.0, most)
+        html = render(PageContent(title="x", player=shown))
+        assert ("--set render.max_seconds=1 shows the whole dance" in html) == is_cut

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.report.video.timeline import reference_qpos, timeline
+from robojackson.report.video.timeline import cut_note, reference_qpos, timeline
 
 
 def test_cyclic_reference_starts_again_after_a_cycle(reference: ReferenceMotion) -> None:
@@ -48,3 +48,18 @@ def test_reference_moves_on_by_a_cycle(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     qpos = reference_qpos(reference, when)
     np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.cycle_offset)
+
+
+def test_a_dance_that_is_cut_says_what_is_shown_of_what(reference: ReferenceMotion) -> None:
+    long = replace(reference, dt=1.0)
+    when = timeline(long, 30.0, 12, 0, 30.0, 20.0)
+    note = cut_note(long, len(when) / 30.0, 30.0)
+    assert note.startswith("The first 20.0 s of 27.0 s are shown")
+    assert "--set render.max_seconds=27 " in note
+
+
+def test_a_dance_that_is_shown_whole_has_no_note(reference: ReferenceMotion) -> None:
+    for dt in (reference.dt, 0.7401):
+        motion = replace(reference, dt=dt)
+        when = timeline(motion, 30.0, 12, 0, 30.0, 20.0)
+        assert cut_note(motion, len(when) / 30.0, 30.0) == ""

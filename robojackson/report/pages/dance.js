@@ -7,6 +7,8 @@ const Dance = (() => {
   const shares = (text, largest, width) => Float32Array.from(new Int16Array(bytes(text)), (part, i) => part * largest[Math.floor(i / width)]);
 
   async function load(zipped) {
+    const lacks = ['WebAssembly', 'DecompressionStream'].filter((name) => !(name in globalThis));
+    if (lacks.length) throw new Error(`it lacks ${lacks.join(' and ')}; open the page in a newer one`);
     const stream = new Blob([bytes(zipped)]).stream().pipeThrough(new DecompressionStream('gzip'));
     return MUJOCO.default({ wasmBinary: await new Response(stream).arrayBuffer() });
   }
@@ -20,6 +22,15 @@ const Dance = (() => {
   }
   /* The transpose of a matrix times a vector: a world vector in the frame of the body. */
   const local = (r, x, y, z) => [r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z];
+
+  /* The points that begin at `places`, relative to the pelvis and turned by minus the heading of a root, as `rollout_score.heading_frame`. */
+  function headingFrame(values, places, pelvis, root) {
+    const yaw = Math.atan2(root[3], root[0]), c = Math.cos(yaw), s = Math.sin(yaw);
+    return places.map((at) => {
+      const [x, y, z] = [0, 1, 2].map((k) => values[at + k] - values[places[pelvis] + k]);
+      return [c * x + s * y, c * y - s * x, z];
+    });
+  }
 
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const STAGES = [[0.5], [0, 0.5], [0, 0, 1], [1 / 6, 1 / 3, 1 / 3, 1 / 6]], RK4 = 1;
@@ -289,13 +300,10 @@ const Dance = (() => {
       const up = matrixOf(qpos, 3), target = matrixOf(aim, 3), along = up[2] * target[2] + up[5] * target[5] + up[8] * target[8];
       const low = fall.relative ? Math.abs(qpos[2] - aim[2]) > fall.height : qpos[2] < fall.height;
       this.fallen ||= low || (fall.relative ? along : up[8]) < fall.cosTilt || !Number.isFinite(qpos[2]);
-      const { row, moved } = this.at(this.step);
-      let sum = 0;
-      this.sites.forEach((site, i) => {
-        const from = 3 * (row * this.sites.length + i);
-        sum += Math.hypot(...[0, 1, 2].map((k) => this.points[from + k] + moved[k] - sites[3 * site + k]));
-      });
-      this.error = sum / this.sites.length;
+      const { row } = this.at(this.step), count = this.sites.length, { pelvis } = this.dance;
+      const here = headingFrame(sites, this.sites.map((site) => 3 * site), pelvis, up);
+      const there = headingFrame(this.points, this.sites.map((_, i) => 3 * (row * count + i)), pelvis, target);
+      this.error = here.reduce((sum, point, i) => sum + Math.hypot(...point.map((value, k) => value - there[i][k])), 0) / count;
       if (!this.fallen) this.danced += 1;
     }
 

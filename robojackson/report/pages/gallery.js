@@ -11,5 +11,7 @@
     document.getElementById('shown').textContent = `${count} of ${entries.length} dances`;
   }
   [...filters, sort].forEach((select) => select.addEventListener('change', apply));
+  /* After Back a browser restores the choices once the scripts have run. */
+  addEventListener('pageshow', apply);
   apply();
 })();

@@ -4,6 +4,7 @@
   const $ = (id) => document.getElementById(id), T = THREE, node = $('live');
   const dance = JSON.parse($('dance-data').textContent);
   const view = new Stage.Panes($('stage'), [$('pane')], $('orbit')), [pane] = view.panes, { materials } = view;
+  if (!view.renderer) throw new Error('it draws no 3D (WebGL); turn on hardware acceleration or open the page in another one');
   const robot = Stage.robot(dance.shape, materials.trained, materials.shadow, view.software);
   const ghost = Stage.robot(dance.shape, materials.ghost, null, view.software);
   ghost.group.visible = false;
@@ -14,7 +15,7 @@
 
   const mujoco = await Dance.load(dance.wasm);
   delete dance.wasm;
-  const dancer = new Dance.Dancer(mujoco, dance), state = { playing: true, speed: 1, follow: true, drawn: 0, steps: 0 };
+  const dancer = new Dance.Dancer(mujoco, dance), state = { playing: !matchMedia('(prefers-reduced-motion: reduce)').matches, speed: 1, follow: true, drawn: 0, steps: 0 };
   const seconds = (steps) => `${(steps * dance.dt).toFixed(1)} s`;
 
   /* What the badge says: recorded starts, simulated here as well, end where Python's MuJoCo ended. */
@@ -51,7 +52,7 @@
     aimAt(event);
     const [hit] = ray.intersectObjects(robot.parts);
     if (!hit) return;
-    event.stopPropagation(); event.preventDefault();
+    event.stopPropagation(); event.preventDefault(); node.focus({ preventScroll: true, focusVisible: false });
     held.body = hit.object.userData.body;
     const { xpos, xmat } = dancer.data, b = held.body, off = hit.point.toArray().map((value, k) => value - xpos[3 * b + k]);
     held.point.set(...[0, 1, 2].map((c) => [0, 1, 2].reduce((sum, r) => sum + xmat[9 * b + 3 * r + c] * off[r], 0)));
@@ -59,6 +60,8 @@
     held.aim.copy(hit.point); pull.visible = true;
     $('orbit').setPointerCapture(event.pointerId);
   }, { capture: true });
+  /* A finger on the robot pulls it; beside it, it scrolls the page. */
+  $('orbit').addEventListener('touchstart', (event) => { if (pull.visible) event.preventDefault(); }, { passive: false });
   $('orbit').addEventListener('pointermove', (event) => {
     if (!pull.visible) return;
     event.stopPropagation(); aimAt(event); ray.ray.intersectPlane(held.plane, held.aim);
@@ -114,7 +117,8 @@
   }
 
   const press = (id, on) => $(id).setAttribute('aria-pressed', String(on));
-  const play = () => { state.playing = !state.playing; $('play').textContent = state.playing ? 'Pause' : 'Play'; };
+  const label = () => { $('play').textContent = state.playing ? 'Pause' : 'Play'; };
+  const play = () => { state.playing = !state.playing; label(); };
   const flipGhost = () => { ghost.group.visible = !ghost.group.visible; press('ghost', ghost.group.visible); show(); };
   const flipFollow = () => { state.follow = !state.follow; press('follow', state.follow); };
   const setMode = (mode) => { $('mode').value = mode; dancer.mode = mode; again(); };
@@ -138,14 +142,20 @@
     ' ': play, r: again, p: () => push(), g: flipGhost, f: flipFollow, s: slow, o: () => setMode(modes[(modes.indexOf(dancer.mode) + 1) % 3]),
     a: () => view.turn(-0.2, 0), d: () => view.turn(0.2, 0), w: () => view.turn(0, -0.12), x: () => view.turn(0, 0.12), '+': buttons.nearer, '-': buttons.farther,
   };
-  node.addEventListener('keydown', (event) => {
+  document.addEventListener('keydown', (event) => {
+    if (event.target !== document.body && !node.contains(event.target)) return;
     if (event.ctrlKey || event.metaKey || event.altKey || ['SELECT', 'INPUT'].includes(event.target.tagName)) return;
     if (['BUTTON', 'SUMMARY'].includes(event.target.tagName) && event.key === ' ') return;
     const act = keys[event.key];
     if (act) { event.preventDefault(); act(); }
   });
-  view.measure(); again();
+  view.measure(); label(); again();
   node.dataset.ready = 'yes';
-  requestAnimationFrame((now) => { before = since = now; check(dance.checked); again(); node.dataset.checked = 'yes'; requestAnimationFrame(loop); });
   window.robojackson = { dancer, dance, state, view, check, again, push, held, drag, show };
-})();
+  before = since = await new Promise(requestAnimationFrame);
+  check(dance.checked); again(); node.dataset.checked = 'yes'; requestAnimationFrame(loop);
+})().catch((error) => {
+  const badge = document.getElementById('badge');
+  badge.textContent = `this browser cannot run the dance: ${error.message}`; badge.classList.add('bad');
+  console.error(error);
+});

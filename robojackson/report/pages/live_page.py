@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.report.pages import inline
 from robojackson.report.web.live_data import live_data
 from robojackson.report.web.pane_camera import MARGIN_M
@@ -18,6 +19,8 @@ PULL = 6.0
 """Stiffness of the pointer's pull, 1/s^2: newtons per metre and kilogram."""
 STRONGEST = 5.0
 """Largest acceleration of the whole robot by the pointer, m/s^2."""
+LEFT_S = 1.0
+"""Time that an open dance has left after its last start, seconds."""
 ROOM = 1.35
 """Margin of the pane around the dance, of its height."""
 
@@ -54,6 +57,13 @@ def live_page(run: RecordedRun, title: str) -> str | None:
         title=title,
         robot=run.reference.robot,
         data=inline.json_text(data),
-        steps=len(run.reference),
+        last_start=last_start(run.reference),
         dancer=dancer,
     )
+
+
+def last_start(reference: ReferenceMotion) -> int:
+    """Return the last step at which a dance can begin; one that is not cyclic starts again as soon
+    as it ends."""
+    left = 0 if reference.cyclic else round(LEFT_S / reference.dt)
+    return max(0, len(reference) - 1 - left)

@@ -1,12 +1,23 @@
 /* The player of a run: the source's video is the clock, all panes and curves go by its picture. */
 'use strict';
+/* What this page needs of a video, by the computer's clock: for a film that the browser cannot decode. */
+class Clock extends EventTarget {
+  constructor(seconds, at, rate) { super(); Object.assign(this, { seconds, at, rate, paused: true, muted: true, since: 0 }); }
+  get currentTime() { return this.paused ? this.at : (this.at + (this.rate * (performance.now() - this.since)) / 1000) % this.seconds; }
+  set currentTime(seconds) { this.at = seconds; this.since = performance.now(); }
+  get playbackRate() { return this.rate; }
+  set playbackRate(rate) { this.currentTime = this.currentTime; this.rate = rate; }
+  async play() { this.since = performance.now(); this.paused = false; this.dispatchEvent(new Event('play')); }
+  pause() { this.at = this.currentTime; this.paused = true; this.dispatchEvent(new Event('pause')); }
+}
 (() => {
   const node = document.getElementById('player');
   if (!node) return;
   const data = JSON.parse(document.getElementById('player-data').textContent);
   const $ = (id) => document.getElementById(id);
-  const video = $('source'), seek = $('seek'), { count, fps } = data, state = { picture: 0, drawn: -1 };
+  const video = $('source'), seek = $('seek'), { count, fps } = data, state = { picture: 0, drawn: -1, target: null };
   const T = THREE;
+  let clock = video, runs = false;
 
   video.src = URL.createObjectURL(new Blob([Stage.bytes(data.video)], { type: 'video/mp4' }));
   delete data.video;
@@ -15,6 +26,7 @@
   const elements = tracks.map((name) => $(`pane-${name}`));
   const view = new Stage.Panes($('stage'), elements, $('orbit'));
   const { materials } = view;
+  $('flat').hidden = Boolean(view.renderer);
   const figures = {}, ghost = data.trained && Stage.robot(data.robot, materials.ghost, null, view.software);
   tracks.forEach((name, i) => {
     const pane = view.panes[i], track = data[name];
@@ -29,10 +41,11 @@
     if (name === 'trained') pane.scene.add(ghost.group);
   });
   if (ghost) ghost.group.visible = false;
-  let follow = true;
+  let follow = true, held = false;
 
   function show(picture) {
     state.picture = picture;
+    if (picture === state.target) state.target = null;
     tracks.forEach((name, i) => {
       const pane = view.panes[i], { track } = pane, at = follow ? picture : 0;
       figures[name].pose(track.values, picture * track.row);
@@ -40,7 +53,7 @@
       pane.width = track.wide[picture];
     });
     if (ghost?.group.visible) ghost.pose(data.reference.values, picture * data.reference.row);
-    if (document.activeElement !== seek || video.paused) seek.value = picture;
+    if (!held) seek.value = picture;
     const seconds = picture / fps;
     seek.setAttribute('aria-valuetext', `${seconds.toFixed(2)} s`);
     $('clock').textContent = `${seconds.toFixed(2)} s`;
@@ -66,20 +79,27 @@
     state.drawn = state.picture; frames += 1;
   }
   function loop(now) {
-    if (!video.requestVideoFrameCallback && !video.paused) show(pictureAt(video.currentTime));
+    if (clock !== video) {
+      const picture = pictureAt(clock.currentTime);
+      if (picture !== state.picture) show(picture);
+    } else if (!video.requestVideoFrameCallback && !video.paused) show(pictureAt(video.currentTime));
     draw();
     if (now - since > 1000) { state.rate = (1000 * frames) / (now - since); frames = 0; since = now; }
     requestAnimationFrame(loop);
   }
 
+  /* While it stands, the next step counts from where it is going: the picture there may be yet to come. */
   const go = (picture) => {
     const target = Math.min(count - 1, Math.max(0, picture));
-    video.currentTime = (target + 0.5) / fps;
+    state.target = clock.paused ? target : null;
+    clock.currentTime = (target + 0.5) / fps;
   };
-  const step = (by) => { video.pause(); go(state.picture + by); };
-  const toggle = () => (video.paused ? video.play() : video.pause());
+  const start = () => { runs = true; return clock.play(); };
+  const halt = () => { runs = false; clock.pause(); };
+  const step = (by) => { halt(); go((state.target ?? state.picture) + by); };
+  const toggle = () => (clock.paused ? start() : halt());
   const press = (id, on) => $(id).setAttribute('aria-pressed', String(on));
-  const setSpeed = (value) => { $('speed').value = value; video.playbackRate = Number(value); };
+  const setSpeed = (value) => { $('speed').value = value; clock.playbackRate = Number(value); };
   const flip = {
     follow() { follow = !follow; press('follow', follow); show(state.picture); },
     ghost() {
@@ -92,24 +112,38 @@
       $('sound').textContent = video.muted ? 'Sound on' : 'Sound off';
     },
   };
-  video.addEventListener('play', () => { $('play').textContent = 'Pause'; });
-  video.addEventListener('pause', () => { $('play').textContent = 'Play'; });
+  function label() {
+    $('play').textContent = clock.paused ? 'Play' : 'Pause';
+    if (!clock.paused) state.target = null;
+  }
+  const heed = () => ['play', 'pause'].forEach((change) => clock.addEventListener(change, label));
+  heed();
+  video.addEventListener('error', () => {
+    clock = new Clock(count / fps, state.picture / fps, Number($('speed').value));
+    $('undecoded').hidden = false;
+    if ($('sound')) $('sound').disabled = true;
+    heed(); if (runs) clock.play();
+  }, { once: true });
   const buttons = {
     play: toggle, back: () => step(-1), next: () => step(1), follow: flip.follow, ghost: flip.ghost, sound: flip.sound,
     front: () => view.look(0), side: () => view.look(Math.PI / 2), top: () => view.look(0, 0.2),
     nearer: () => view.zoom(0.85), farther: () => view.zoom(1 / 0.85),
   };
   for (const [id, act] of Object.entries(buttons)) $(id)?.addEventListener('click', act);
-  seek.addEventListener('input', () => { video.pause(); go(Number(seek.value)); });
+  seek.addEventListener('pointerdown', () => { held = true; });
+  for (const end of ['pointerup', 'pointercancel']) addEventListener(end, () => { held = false; }, { capture: true });
+  seek.addEventListener('input', () => { halt(); go(Number(seek.value)); });
   $('speed').addEventListener('change', (event) => setSpeed(event.target.value));
   const keys = {
     ' ': toggle, k: toggle, ArrowLeft: () => step(-1), ArrowRight: () => step(1), ',': () => step(-1), '.': () => step(1),
     j: () => step(-Math.round(fps)), l: () => step(Math.round(fps)), Home: () => go(0), End: () => go(count - 1),
-    f: flip.follow, g: flip.ghost, m: flip.sound, s: () => setSpeed(video.playbackRate === 1 ? '0.25' : '1'),
+    f: flip.follow, g: flip.ghost, m: flip.sound, s: () => setSpeed(clock.playbackRate === 1 ? '0.25' : '1'),
     a: () => view.turn(-0.2, 0), d: () => view.turn(0.2, 0), w: () => view.turn(0, -0.12), x: () => view.turn(0, 0.12),
     '+': buttons.nearer, '-': buttons.farther, 1: buttons.front, 2: buttons.side, 3: buttons.top,
   };
-  node.addEventListener('keydown', (event) => {
+  document.addEventListener('keydown', (event) => {
+    /* Home and End belong to the page until the player is in focus. */
+    if (event.target === document.body ? ['Home', 'End'].includes(event.key) : !node.contains(event.target)) return;
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === 'SELECT') return;
     if (['BUTTON', 'SUMMARY'].includes(event.target.tagName) && event.key === ' ') return;
     const act = keys[event.key];
@@ -132,7 +166,10 @@
       cursor: { y: false, points: { size: 7 }, drag: { x: false, y: false } },
       series: [{}, ...series.map(({ name, stroke, dash }) => ({ label: name, stroke: colour(stroke), width: 2, dash }))],
     }, [seconds, ...series.map(({ values }) => values)], host);
-    made.over.addEventListener('click', () => { video.pause(); go(Math.round(made.posToVal(made.cursor.left, 'x') * fps)); });
+    /* By the place of the click: the cursor follows the dance while it plays. */
+    made.over.addEventListener('click', (event) => {
+      halt(); go(Math.round(made.posToVal(event.clientX - made.over.getBoundingClientRect().left, 'x') * fps));
+    });
     host.setAttribute('aria-label', label);
     return made;
   }
@@ -161,7 +198,7 @@
 
   view.measure(); plotAll(); requestAnimationFrame(loop);
   if (matchMedia('(prefers-reduced-motion: reduce)').matches) go(0);
-  else video.play().catch(() => go(0));
+  else start().catch(() => go(0));
   node.dataset.ready = 'yes';
   window.robojackson = { state, video, view, go, step, data, curves };
 })();

@@ -122,14 +122,23 @@ const Stage = (() => {
     return { group, pose };
   }
 
-  /* Panes that share one canvas, one light and one orbit, each with a floor and a point it follows. */
+  /* What draws on a canvas; null where the browser has no WebGL. */
+  function rendererOf(canvas, smooth) {
+    try {
+      return new T.WebGLRenderer({ canvas, antialias: smooth, powerPreference: 'high-performance' });
+    } catch {
+      return null;
+    }
+  }
+
+  /* Panes that share one canvas, one light and one orbit, each with a floor and a point it follows; empty where `renderer` is null. */
   class Panes {
     constructor(canvas, elements, orbitElement) {
       this.canvas = canvas;
       this.software = softwareRendering();
-      this.renderer = new T.WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
-      this.renderer.setPixelRatio(this.software ? Math.min(1, 900 / canvas.clientWidth) : Math.min(devicePixelRatio, 2));
-      this.renderer.setScissorTest(true);
+      this.renderer = rendererOf(canvas, !this.software);
+      this.renderer?.setPixelRatio(this.software ? Math.min(1, 900 / canvas.clientWidth) : Math.min(devicePixelRatio, 2));
+      canvas.addEventListener('webglcontextrestored', () => this.draw());
       this.materials = {
         reference: new T.MeshLambertMaterial(), trained: new T.MeshLambertMaterial(), shadow: new T.MeshBasicMaterial(),
         ghost: new T.MeshLambertMaterial({ transparent: true, opacity: 0.32, depthWrite: false }),
@@ -192,7 +201,7 @@ const Stage = (() => {
 
     measure() {
       const box = this.canvas.parentElement.getBoundingClientRect();
-      this.renderer.setSize(box.width, box.height, false);
+      this.renderer?.setSize(box.width, box.height, false);
       for (const pane of this.panes) {
         const r = pane.element.getBoundingClientRect();
         pane.box = [r.left - box.left, box.height - (r.bottom - box.top), r.width, r.height];
@@ -217,8 +226,10 @@ const Stage = (() => {
     draw() { this.dirty = true; }
 
     render() {
-      if (!this.dirty || !this.panes[0].box) return false;
+      if (!this.dirty || !this.renderer || !this.panes[0].box) return false;
       this.dirty = false;
+      /* Each time: a context that was lost and restored has forgotten it. */
+      this.renderer.setScissorTest(true);
       for (const pane of this.panes) {
         if (pane.element.hidden) continue;
         this.aim(pane);

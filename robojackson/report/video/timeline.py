@@ -4,6 +4,7 @@ Time 0 is the first step of the reference motion. A cyclic reference and its sou
 reference holds its last step. Seconds.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +59,23 @@ def timeline(
         frame=np.clip(frame, 0, source_frames - 1),
         rollout=np.clip(elapsed, 0, max(rollout_steps - 1, 0)),
         ended=elapsed >= rollout_steps,
+    )
+
+
+def cut_note(reference: ReferenceMotion, shown_s: float, fps: float) -> str:
+    """Return how much of a dance is shown, with the setting that shows all of it; empty for a whole
+    one.
+
+    Args:
+        shown_s: Length of the pictures, seconds.
+        fps: Pictures a second.
+    """
+    whole_s = len(reference) * reference.dt
+    if whole_s - shown_s <= 1 / fps:
+        return ""
+    return (
+        f"The first {shown_s:.1f} s of {whole_s:.1f} s are shown, here and in the video: "
+        f"--set render.max_seconds={math.ceil(whole_s)} shows the whole dance."
     )
 
 

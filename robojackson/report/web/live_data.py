@@ -35,6 +35,7 @@ from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.names import PELVIS
 
 LARGEST, TINY = 32767, 1e-30
 """Largest number of 16 bits, and of a motor without gains."""
@@ -71,6 +72,7 @@ def live_data(
         "cyclic": bool(reference.cyclic),
         "offset": np.asarray(reference.cycle_offset, float).tolist(),
         "sites": names,
+        "pelvis": robot.keypoint_names.index(PELVIS),
         "observation": seen,
         "preview": packed(preview_of(reference, robot)) if sees_ahead(policy) else None,
         "rest": robot.standing[7:].tolist(),

@@ -16,7 +16,7 @@ from robojackson.mocap.reprojection import weak_frames
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
-from robojackson.report.video.timeline import Timeline, reference_qpos, timeline
+from robojackson.report.video.timeline import Timeline, cut_note, reference_qpos, timeline
 from robojackson.report.web.pane_camera import followed, followed_beside
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
@@ -65,6 +65,7 @@ class Player:
         error_m: Distance of each site from the reference's at every picture, in the frame of pelvis
             and heading, by name; empty without a rollout.
         points: Keypoints of dancer, reference and robot at every picture, metres.
+        note: How much of a dance is shown that is longer than `max_seconds`; empty for a whole one.
     """
 
     data: dict[str, object]
@@ -72,6 +73,7 @@ class Player:
     when: Timeline
     error_m: dict[str, Float[np.ndarray, " N"]]
     points: dict[str, Float[np.ndarray, "N K 3"]]
+    note: str = ""
 
     @property
     def error_while_up(self) -> dict[str, Float[np.ndarray, " M"]]:
@@ -130,7 +132,8 @@ def player(
     bands = _contact_bands(sequence, reference, when)
     far_m = FAR * robot.description.strict.sites
     bands.append(Band("look here", attention(sequence, reference, when, errors, track, far_m)))
-    return Player(data, [band for band in bands if band.spans], when, errors, moved)
+    shown = [band for band in bands if band.spans]
+    return Player(data, shown, when, errors, moved, cut_note(reference, len(when) / fps, fps))
 
 
 def _torques(reference: ReferenceMotion, when: Timeline) -> str | None:

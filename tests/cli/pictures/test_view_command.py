@@ -73,7 +73,7 @@ def test_a_film_becomes_a_picture_that_moves(kind: str, folder: Path, tmp_path: 
     assert in_process("view", folder, "--to", kind, "-o", out).code == 0
     with Image.open(out) as image:
         assert (image.format, image.width) == (kind.upper(), 640)
-        assert image.n_frames == FRAMES / 2
+        assert image.n_frames == FRAMES / 3
         assert image.info.get("loop") == 0
 
 

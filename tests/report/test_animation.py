@@ -1,0 +1,33 @@
+"""Animated pictures are as long as their film."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from robojackson.report.video.animation import FPS, durations_ms, write_animation
+from robojackson.report.video.encoder import write_video
+
+FRAMES = 60
+
+
+@pytest.mark.parametrize("kind", ["gif", "webp"])
+@pytest.mark.parametrize("fps", [5, 12, 24, 25, 30, 50])
+def test_an_animation_is_as_long_as_its_film(fps: int, kind: str, tmp_path: Path) -> None:
+    pictures = [np.full((32, 48, 3), 4 * k, np.uint8) for k in range(FRAMES)]
+    film = write_video(pictures, fps, tmp_path / "film.mp4")
+    durations = []
+    with Image.open(write_animation(film, tmp_path / f"film.{kind}", kind)) as image:
+        for index in range(image.n_frames):
+            image.seek(index)
+            image.load()
+            durations.append(image.info["duration"])
+    assert len(durations) <= FPS * FRAMES / fps + 1
+    assert sum(durations) == pytest.approx(1000 * FRAMES / fps, abs=5)
+
+
+def test_durations_are_whole_units_whose_sum_does_not_wander() -> None:
+    durations = durations_ms(1000, 1 / 30)
+    assert set(durations) == {30, 40}
+    assert sum(durations) == 33_330
