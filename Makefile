@@ -33,6 +33,8 @@ WORKERS ?= auto
 # A worker that crashes ends the run, which names its test: groups wait for ever for another one.
 PYTEST := $(PY) -m pytest -q -n $(WORKERS) --dist loadgroup --max-worker-restart=0
 export OMP_NUM_THREADS ?= 1
+# Images of containers often forbid compiled modules: every process would compile 1,000 files again.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: badinput dance test test-fast test-stack test-browser coverage bench bench-league bench-learning bench-mocap bench-retarget chaos bench-orchestration bench-pages deploy lint doctor docs wheel clean setup
 .DEFAULT_GOAL := dance

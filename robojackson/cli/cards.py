@@ -81,7 +81,7 @@ def mocap_lines(answer: Answer) -> list[str]:
     seconds = answer["frames"] / answer["fps"]
     rows = [
         f"frames    {answer['frames']} at {answer['fps']:.4g} a second, {seconds:.1f} s",
-        f"person    {answer['person']}, seen in {answer['detected']} frames",
+        f"person    {answer['person']}, seen in {answer['detected']} of {answer['frames']} frames",
         f"planted   {feet} of the time",
         f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
     ]

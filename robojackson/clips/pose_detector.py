@@ -104,6 +104,8 @@ def track_of(
     lost = max(info.frames - len(table), 0)
     if lost:
         notes = (*notes, f"{lost} of {info.frames} frames are damaged and were left out")
+    if info.step > 1:
+        notes = (*notes, f"of {info.fps * info.step:.0f} frames a second {info.fps:.0f} are read")
     if info.uneven:
         notes = (*notes, "the frame rate varies: the motion is resampled to its mean")
     return LandmarkTrack(

@@ -19,10 +19,12 @@ from robojackson.clips.video_container import (
     FASTEST,
     declared_rate,
     first_frame,
+    frame_step,
     opened,
     packet_times,
     pixel_aspect,
     rate,
+    step_of,
     video_stream,
 )
 from robojackson.config import config_dataclass
@@ -64,11 +66,12 @@ class VideoInfo:
     Attributes:
         path: The file.
         width, height: Size of the upright image, square pixels.
-        fps: Mean frames a second.
+        fps: Mean frames a second that are read.
         uneven: Whether the frames are not evenly spaced, as a phone writes them.
-        frames: Number of frames in the file.
+        frames: Number of frames that are read.
         duration_s: frames / fps, seconds.
         rotation: Clockwise degrees that turn a stored image upright: 0, 90, 180 or 270.
+        step: Every `step`-th frame of the file is read; 1 below 90 frames a second.
     """
 
     path: Path
@@ -79,6 +82,7 @@ class VideoInfo:
     duration_s: float
     rotation: int
     uneven: bool = False
+    step: int = 1
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the figures as JSON.
@@ -142,8 +146,11 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     rotation = -first.rotation % 360
     size = (round(first.width * aspect), first.height)
     size = size[::-1] if rotation % 180 else size
+    step = frame_step(fps)
+    stamps = stamps[::step]
+    fps = rate(stamps, fps / step)
     frames = len(stamps)
-    info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps))
+    info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps), step)
     require_within(info, limits)
     return info
 
@@ -184,7 +191,8 @@ def timed_frames(
 
 
 def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
-    """Yield timestamps, frames and the aspect of their pixels."""
+    """Yield timestamps, frames and the aspect of their pixels, of every frame that is read."""
+    step = step_of(path)
     with opened(path) as container:
         stream = video_stream(container, path)
         stream.thread_type, aspect = "NONE", pixel_aspect(stream)
@@ -205,7 +213,8 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
             for frame in frames:
                 good += 1
                 time_s = good / declared if frame.time is None else float(frame.time)
-                yield time_s, frame, aspect
+                if (good - 1) % step == 0:
+                    yield time_s, frame, aspect
 
 
 def _require_complete(path: Path, frames: int, promised: int) -> None:

@@ -3,7 +3,7 @@
 FFmpeg gets an absolute path with the protocol `file` and may open nothing else, so that neither a
 colon in a name nor a playlist leads it to the network or to another file. Only the containers of
 `CONTAINERS` are read; a picture may have `MOST_PIXELS`, a stream `MOST_FRAMES` frames at no more
-than `FASTEST` a second.
+than `FASTEST` a second, of which about `ANALYSED` are read.
 """
 
 from itertools import islice
@@ -40,6 +40,8 @@ MOST_FRAMES = 500_000
 """More than an hour at 120 frames a second."""
 FASTEST = 1000.0
 """Frames a second."""
+ANALYSED = 60.0
+"""Frames a second that are read, about: of a faster file every second frame, or third, or so on."""
 RATE_TOLERANCE = 0.002
 """A declared rate that differs from the timestamps by more is ignored."""
 
@@ -150,3 +152,20 @@ def rate(stamps: np.ndarray, stated: float) -> float:
         return stated
     measured = float((len(stamps) - 1) / span_s)
     return stated if abs(stated / measured - 1.0) <= RATE_TOLERANCE else measured
+
+
+def frame_step(fps: float) -> int:
+    """Return n where every n-th frame of a file is read: 1 below 90 frames a second, 2 of 120, 4 of
+    240. A dance needs no more, and time and memory grow with the frames."""
+    return max(1, round(fps / ANALYSED))
+
+
+def step_of(path: Path) -> int:
+    """Return the step between the frames of a file that are read.
+
+    Raises:
+        UnreadableVideo, TruncatedVideo: the file cannot be read to its end.
+    """
+    with opened(path) as container:
+        declared = declared_rate(video_stream(container, path))
+    return frame_step(rate(packet_times(path), declared))

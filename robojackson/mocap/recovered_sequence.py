@@ -91,4 +91,5 @@ def swap_notes(landmarks: Landmarks) -> tuple[str, ...]:
     """Return a note on exchanged sides, if any were."""
     if not landmarks.swapped:
         return ()
-    return (f"left and right exchanged in {landmarks.swapped} frames: corrected",)
+    frames = f"{landmarks.swapped} of {len(landmarks.valid)} frames"
+    return (f"left and right exchanged in {frames}: corrected",)

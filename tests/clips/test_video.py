@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from robojackson.clips.pose_detector import track_of
 from robojackson.clips.trim import trim
 from robojackson.clips.upright_frame import TURNS
 from robojackson.clips.video import (
@@ -49,6 +50,28 @@ def test_probe_returns_what_was_written(write_video) -> None:
 def test_every_frame_is_read_in_order(write_video) -> None:
     levels = [int(image[:, 40:].mean()) for image in read_frames(write_video(frames=20))]
     assert np.abs(np.array(levels) - 2 * np.arange(20)).max() <= 2
+
+
+@pytest.mark.parametrize(
+    ("file_fps", "read", "step"),
+    [(60, 60.0, 1), (90, 45.0, 2), (120, 60.0, 2), (240, 60.0, 4), (480, 60.0, 8)],
+)
+def test_of_a_fast_file_about_sixty_frames_a_second_are_read(
+    write_video, file_fps: int, read: float, step: int
+) -> None:
+    path = write_video(frames=24, fps=file_fps)
+    info, frames = probe(path, LIMITS), list(timed_frames(path))
+    assert (info.fps, info.step, info.frames) == (pytest.approx(read), step, 24 // step)
+    assert not info.uneven
+    levels = [int(image[:, 40:].mean()) for _, image in frames]
+    assert np.abs(np.array(levels) - 2 * np.arange(0, 24, step)).max() <= 2
+    assert [time for time, _ in frames] == pytest.approx(np.arange(24 // step) / read, abs=1e-3)
+
+
+def test_the_track_of_a_fast_file_says_how_much_of_it_was_read(write_video) -> None:
+    info = probe(write_video(frames=24, fps=240), LIMITS)
+    rows = np.zeros((info.frames, 33, 7))
+    assert track_of(rows, np.arange(6) / 60, info).notes == ("of 240 frames a second 60 are read",)
 
 
 def test_frames_have_no_padding_between_rows(write_video) -> None:

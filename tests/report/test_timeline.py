@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from robojackson.clips.video import VideoLimits
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.report.video.film import VideoConfig
 from robojackson.report.video.timeline import cut_note, reference_qpos, timeline
 
 
@@ -63,3 +65,9 @@ def test_a_dance_that_is_shown_whole_has_no_note(reference: ReferenceMotion) -> 
         motion = replace(reference, dt=dt)
         when = timeline(motion, 30.0, 12, 0, 30.0, 20.0)
         assert cut_note(motion, len(when) / 30.0, 30.0) == ""
+
+
+def test_every_clip_of_the_default_length_is_shown_whole() -> None:
+    longest = VideoLimits().max_duration_s
+    assert longest is not None
+    assert VideoConfig().max_seconds >= longest

@@ -43,5 +43,6 @@ def look_again(
     rows, used = track_in_reverse(images, info.fps, shape, size, first, reverse, progress)
     if not used:
         return single
-    notes = (f"{used} frames tracked in reverse order: limbs were lost in the order of the clip",)
+    frames = f"{used} of {len(first)} frames"
+    notes = (f"{frames} tracked in reverse order: limbs were lost in the order of the clip",)
     return track_of(rows, single.times, info, notes=notes)

@@ -32,7 +32,8 @@ def mended(
         notes.append("first frame left out: a rest pose before the motion")
     points, spikes = without_spikes(points, fps)
     if spikes:
-        notes.append(f"joints that jump away and back interpolated in {spikes} frames")
+        frames = f"{spikes} of {len(points)} frames"
+        notes.append(f"joints that jump away and back interpolated in {frames}")
     return points, tuple(notes)
 
 

@@ -48,7 +48,8 @@ class VideoConfig:
     Attributes:
         fps: Pictures a second.
         panel_width, panel_height: Pixels of one panel, even.
-        max_seconds: Longest video, seconds.
+        max_seconds: Longest video, seconds; as `video.max_duration_s`, so that a dance is shown
+            whole.
         azimuth_deg: Rotation of the cameras around the subject; 0 is the front.
         quality: Constant rate factor of H.264; lower is better and larger.
         music: Path of music that replaces the clip's own sound.
@@ -60,7 +61,7 @@ class VideoConfig:
     fps: int = Field(default=30, ge=1)
     panel_width: int = Field(default=320, ge=64, multiple_of=2)
     panel_height: int = Field(default=480, ge=64, multiple_of=2)
-    max_seconds: float = Field(default=20.0, gt=0.0)
+    max_seconds: float = Field(default=60.0, gt=0.0)
     azimuth_deg: float = 0.0
     quality: int = Field(default=20, ge=0, le=51)
     music: str = ""

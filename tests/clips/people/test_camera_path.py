@@ -76,7 +76,7 @@ def test_a_cut_is_reported() -> None:
     images = [view(wall(0), WIDTH)] * 20 + [view(wall(9), WIDTH)] * 20
     found = path_of(images)
     assert np.flatnonzero(found.jumps).tolist() == [20]
-    assert "jumps in 1 frames (first: 20)" in found.notes[0]
+    assert "jumps in 1 of 40 frames (first: 20)" in found.notes[0]
 
 
 @pytest.mark.medium
