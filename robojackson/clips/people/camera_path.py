@@ -79,9 +79,8 @@ class CameraPath:
         lost = np.flatnonzero(self.jumps)
         if len(lost):
             messages.append(
-                f"the background jumps in {len(lost)} of {len(self.jumps)} frames (first: "
-                f"{lost[0]}), a cut or a violent shake: the path through the room is not to be "
-                "trusted"
+                f"background jumps in {len(lost)} of {len(self.jumps)} frames (first: {lost[0]}), "
+                "a cut or a violent shake: the path through the room is not to be trusted"
             )
         if self.blind.mean() > BLIND_SHARE:
             messages.append(
