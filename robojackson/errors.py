@@ -147,6 +147,13 @@ class RejectedReference(RoboJacksonError):
         """The message for a caller that has no `--force`."""
         return f"{self.reason}; {self.remedy}" if self.remedy else self.reason
 
+    def advised(self, words: Iterable[str]) -> "RejectedReference":
+        """Return the error with more that may mend it."""
+        remedy = "; ".join(filter(None, [self.remedy, *words]))
+        error = RejectedReference(self.reason, remedy, forcible=self.forcible)
+        error.figure, error.value, error.limit = self.figure, self.value, self.limit
+        return error
+
     def saved_in(self, folder: object) -> "RejectedReference":
         """Return the error with the place of the motion that was refused."""
         error = RejectedReference(self.reason, self.remedy, forcible=self.forcible)

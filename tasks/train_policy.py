@@ -38,7 +38,7 @@ CODE = ("robojackson.api.policy_training",)
 """Module of what the process runs."""
 SHORTEST_MINUTES = 0.5
 """What a training gets in any case."""
-BUDGET = "training gets %.1f of %g min; dances of this length need about %.0f"
+BUDGET = "training gets %.1f min, the pass %g; dances of this length need about %.0f"
 """Log line about the budget, which the bar of `robojackson dance` shows as well."""
 DIGITS = 12
 """Of the digest in a run id."""

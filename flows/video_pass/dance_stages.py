@@ -23,6 +23,7 @@ from flows.video_pass.tracker_stages import (
     track,
 )
 from robojackson.clips.quality.advice import advise
+from robojackson.errors import RejectedReference
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
@@ -42,6 +43,8 @@ from tasks.write_page import joined_evaluation, write_page
 
 Artifacts = dict[str, Artifact]
 Facts = dict[str, Any]
+SPOILING = ("head_down", "body_outside", "person_missing")
+"""Kinds of advice that may explain why the gate refuses a motion."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ async def perform(
         announce("motion capture and retargeting")
         moved = to_reference(best.clip, robot, settings)
         if settings.gate:
-            check(json.loads(Store.from_environment().read(moved["scorecard"].key)))
+            _require_feasible(moved)
         shown = page_settings(best, candidates, robot, settings)
         tracked = None
         if tracker is not None:
@@ -117,6 +120,17 @@ async def perform(
             made = await _trained(best, moved, robot, settings, labels, began, tracked)
         folder = "" if tracked is None else tracked.folder
         return {**made, **write_page(made, labels.move, best.name, shown, folder)}
+
+
+def _require_feasible(moved: Artifacts) -> None:
+    """Apply the gate; a refusal names what in the clip may be the reason."""
+    store = Store.from_environment()
+    try:
+        check(json.loads(store.read(moved["scorecard"].key)))
+    except RejectedReference as cause:
+        advice = advise(artifact_tables.read(LandmarkTrack, store, moved["landmarks"]))
+        reasons = [str(each) for each in advice if each.kind in SPOILING]
+        raise cause.advised(reasons) from None
 
 
 async def _trained(

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from robojackson.mocap.networks.inference import Networks
 
 TABLE = ".parquet"
+OF_STAGES = (TABLE, ".safetensors")
+"""Suffixes of what stages write, and no exporter."""
 MOST_FRAMES, MOST_STEPS = 20_000, 50_000
 """Of a motion that is fitted to a robot: eleven minutes at 30 frames a second, and at 15 ms a
 control step."""
@@ -235,10 +237,12 @@ def _machine(motion: ReferenceMotion, robot: RobotLike | None) -> Robot:
 
 
 def require_another(source: Path, out: Path) -> None:
-    """Refuse to write a result over what it is made from.
+    """Refuse to write a result over what it is made from, or over a table or network of a stage.
 
     Raises:
-        StoreError: both are one file.
+        StoreError: both are one file, or `out` is a file that a stage wrote.
     """
     if out.exists() and source.exists() and out.samefile(source):
         raise StoreError(f"{out}: is the motion itself; write the result to another file")
+    if out.is_file() and out.suffix in OF_STAGES:
+        raise StoreError(f"{out}: is what a stage wrote; write the result to another file")

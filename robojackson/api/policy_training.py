@@ -35,6 +35,7 @@ from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import load_policy
 from robojackson.rl.sim.trainable import require_trainable
 from robojackson.rl.training_hooks import Hooks, Row
+from robojackson.rl.training_task import Task
 from robojackson.robot.model import Robot
 
 DEFAULT_MINUTES = 9.0
@@ -134,6 +135,7 @@ def _trained(
 ) -> TrainedPolicy:
     """Train in a folder that is locked meanwhile; its table is saved in any case."""
     with without_empty_folders(folder), results_in(folder) as files, locked(folder):
+        Task.of(motion, robot).require_own(folder, config)
         rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)

@@ -93,7 +93,7 @@ def mocap(
     as_json: Json = False,
 ) -> CommandResult:
     """Recover the motion of the person in a video: smpl.parquet, landmarks, a picture."""
-    from robojackson.cli import cards, stages
+    from robojackson.cli import cards, mocap_card, stages
     from robojackson.cli.pictures.mocap_pictures import draw_mocap
     from robojackson.cli.pictures.people_listing import list_people
     from robojackson.cli.video_range import video_range
@@ -106,8 +106,8 @@ def mocap(
             data, lines = list_people(shown, out, config, overrides)
             return CommandResult(data, text=lines)
         made = stages.mocap(shown, out, config, overrides, hypotheses, second)
-        made |= draw_mocap(shown, out, config, overrides, film)
-    return CommandResult(made, text=cards.shown(made, cards.mocap_lines(made), verbose))
+        made = mocap_card.judged(made | draw_mocap(shown, out, config, overrides, film))
+    return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))
 
 
 @command

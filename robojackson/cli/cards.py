@@ -16,8 +16,6 @@ from robojackson.retarget.scorecard_gate import BARS, failures
 
 Answer = Mapping[str, Any]
 FULL, EMPTY, CELLS = "█", "·", 10
-WHOLE, MOSTLY = 0.95, 0.7
-"""Shares of frames with the person from which a motion counts as whole, or as having gaps."""
 ROWS: tuple[tuple[str, str, str, int], ...] = (
     ("in the floor", "floor_penetration_mm", "mm", 1),
     ("in itself", "self_penetration_mm", "mm", 1),
@@ -71,93 +69,6 @@ def score_lines(answer: Answer) -> list[str]:
     rows.append("lower is steadier; score/s is missing landmarks and jitter a second")
     rows += [f"! {video['error']}" for video in unread]
     return [*rows, *closing(answer)]
-
-
-def mocap_lines(answer: Answer) -> list[str]:
-    """Return the lines about a recovered motion."""
-    feet = ", ".join(
-        f"{name.replace('_', ' ')} {share:.0%}" for name, share in answer["contact_share"].items()
-    )
-    seconds = answer["frames"] / answer["fps"]
-    rows = [
-        f"frames    {answer['frames']} at {answer['fps']:.4g} a second, {seconds:.1f} s",
-        f"person    {answer['person']}, seen in {answer['detected']} of {answer['frames']} frames",
-        f"planted   {feet} of the time",
-        f"floor     lowest point {100 * answer['floor']['lowest_keypoint_m']:.1f} cm above it",
-    ]
-    rows += _up_lines(answer["floor"])
-    rows += _reprojection_lines(answer)
-    rows += [f"note      {note}" for note in answer["notes"]]
-    rows += advice_lines(answer)
-    rows += [f"motion    {answer['smpl']}"]
-    rows += [f"{key:<9} {answer[key]}" for key in ("picture", "film") if key in answer]
-    return [*rows, *closing(answer)]
-
-
-SOURCES_OF_UP = {
-    "scene": "straight edges of the room",
-    "network": "the body alone",
-    "balance": "the body alone",
-    "camera": "the camera",
-}
-
-
-def _up_lines(floor: Answer) -> list[str]:
-    """Return the line about the direction of up, and how sure it is."""
-    if "tilt_deg" not in floor:
-        return []
-    source = SOURCES_OF_UP[floor["gravity"]]
-    sure = ", sure" if floor.get("gravity_sure") else ", not sure"
-    within = f": within {floor['gravity_sd_deg']:.0f} degrees" if "gravity_sd_deg" in floor else ""
-    tilt = f"the camera is tilted by {floor['tilt_deg']:.0f}"
-    return [f"up        from {source}{sure}{within}; {tilt}"]
-
-
-def _reprojection_lines(answer: Answer) -> list[str]:
-    if (found := answer.get("reprojection")) is None:
-        return []
-    rows = [f"overlay   {100 * found['median_m']:.0f} cm off the landmarks (median)"]
-    advice = "" if found["left_out"] else " (leave them out: --set mocap.leave_out_weak=true)"
-    if weak := _parts(found["weak_s"]):
-        rows.append(f"weak      {weak}{advice}")
-    if filled := _parts(found["filled_s"]):
-        rows.append(f"filled in {filled}")
-    return rows
-
-
-def _parts(parts: Sequence[tuple[float, float]]) -> str:
-    """Return the stretches, those that are closer than can be read as one."""
-    joined: list[list[float]] = []
-    for start, end in parts:
-        if joined and start - joined[-1][1] < 0.15:
-            joined[-1][1] = end
-        else:
-            joined.append([start, end])
-    return ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in joined)
-
-
-def advice_lines(answer: Answer) -> list[str]:
-    """Return advice for filming the clip again, a line each."""
-    return [f"advice    {each['words']}" for each in answer.get("advice", ())]
-
-
-def mocap_verdict(frames: int, detected: int) -> dict[str, str]:
-    """Return kind and sentence about a recovered motion."""
-    share = detected / max(frames, 1)
-    if share >= WHOLE:
-        return {
-            "kind": "whole",
-            "sentence": "The motion is whole: the person is in view all along.",
-        }
-    if share >= MOSTLY:
-        sentence = (
-            f"The person is out of sight in {1 - share:.0%} of the frames, which are filled in."
-        )
-        return {"kind": "gaps", "sentence": sentence}
-    sentence = (
-        f"The person is seen in only {share:.0%} of the frames: choose another range or clip."
-    )
-    return {"kind": "poor", "sentence": sentence}
 
 
 def retarget_lines(answer: Answer) -> list[str]:

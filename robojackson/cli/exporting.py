@@ -4,7 +4,9 @@ The content of the file determines the possible formats: a robot's motion, a per
 policy.
 """
 
+import os
 import shlex
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +16,7 @@ from typing import Any
 from robojackson.cli import cards, console
 from robojackson.cli.lifetime.interruption import python
 from robojackson.cli.trackers.named_tracker import is_tracker
-from robojackson.errors import BadConfiguration
+from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.files.foreign_file import require_file
 from robojackson.formats import registry
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -73,6 +75,8 @@ def export(
     if source.suffix == POLICY_SUFFIX:
         from robojackson.api.foreign_files import write_policy
 
+        if to not in (known := _policy_formats()):
+            raise UnknownName("format", to, f"--to; {source} holds a policy", known)
         policy = write_policy(source, out, to)
         about = {"observations": policy.observation_size, "actions": policy.action_size}
         about |= _policy_verdict(out)
@@ -119,9 +123,16 @@ def _deploy(
     rights = {f"may_{name}": answer for name, answer in made.pop("licences").items()}
     made["files"] = len(made["files"])
     verdict = {"verdict": {"kind": kind, "sentence": sentence}}
-    following = {"next": shlex.join([python(), str(out / "run.py"), "--view"])}
+    viewed = ["--view"] if has_screen() else []
+    following = {"next": shlex.join([python(), str(out / "run.py"), *viewed])}
     figures = {"folder": str(out), "format": DEPLOY, **made, **rights}
     return figures | {"seconds": time.monotonic() - began} | verdict | following
+
+
+def has_screen() -> bool:
+    """Return whether a window can be opened here."""
+    variables = ("DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, variables))
 
 
 def _open_points(made: Mapping[str, Any]) -> list[str]:
@@ -189,11 +200,15 @@ def licences_from(declared: Sequence[str]) -> dict[str, str]:
     return {kind.strip(): licence.strip() for kind, _, licence in pairs}
 
 
+def _policy_formats() -> Mapping[str, object]:
+    return {**registry.policy_exporters(), DEPLOY: None}
+
+
 def names() -> list[str]:
     """Return the possible formats by the kind of file."""
     kinds: dict[str, Mapping[str, object]] = {
         "a robot's motion": registry.robot_exporters(),
         "a person's motion": registry.person_exporters(),
-        "a policy": {**registry.policy_exporters(), DEPLOY: None},
+        "a policy": _policy_formats(),
     }
     return [f"{kind}: {', '.join(sorted(found))}" for kind, found in kinds.items()]

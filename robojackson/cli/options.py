@@ -121,7 +121,10 @@ Trainer = Annotated[
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the training.")]
 Minutes = Annotated[
     float | None,
-    typer.Option(min=0.01, help="Wall time of the whole pass, minutes; 12 by default."),
+    typer.Option(
+        min=0.01,
+        help="Wall time of the whole pass, minutes; 12 by default. Training gets .5 at least.",
+    ),
 ]
 TrainMinutes = Annotated[
     float | None,

@@ -10,9 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from robojackson.cli import cards, console
+from robojackson.cli import cards, console, mocap_card
 from robojackson.cli.lifetime.video_process import in_video_process, probed
 from robojackson.errors import BadConfiguration, NoPersonFound, RejectedReference, TrackTooShort
 from robojackson.files.file_tree import results_in
@@ -74,11 +72,10 @@ def mocap(
         "fps": sequence.fps,
         "detected": int(track.detected.sum()),
         "person": max(track.person, 1),
-        "floor": _floor(sequence),
-        "contact_share": _contact_share(sequence),
+        "floor": mocap_card.floor_figures(sequence),
+        "contact_share": mocap_card.contact_shares(sequence),
         "notes": list(sequence.notes),
         "advice": [each.record for each in advise(track)],
-        "verdict": cards.mocap_verdict(len(sequence), int(sequence.valid.sum())),
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }
@@ -227,18 +224,3 @@ def verdict_lines(evaluation: Mapping[str, Any]) -> list[str]:
         shown = dict.fromkeys(NEEDS_FULL_LENGTH, "too short")
         rows = {name: {**row, **shown} for name, row in rows.items()}
     return console.table(rows, VERDICT)
-
-
-def _contact_share(sequence: "SmplSequence") -> dict[str, float]:
-    from robojackson.motion.smpl_sequence import CONTACT_POINTS, PLANTED
-
-    shares = (sequence.contact == PLANTED).mean(0)
-    return dict(zip(CONTACT_POINTS, map(float, shares), strict=True))
-
-
-def _floor(sequence: "SmplSequence") -> Figures:
-    """Return the source of the floor and the distance of the lowest keypoint from it, metres."""
-    lowest = sequence.keypoints_w[:, :, 2].min(1)
-    keys = ("gravity", "tilt_deg", "gravity_sd_deg", "gravity_sure")
-    known = {key: sequence.camera[key] for key in keys if key in sequence.camera}
-    return {"lowest_keypoint_m": lowest.min(), "median_m": np.median(lowest), **known}

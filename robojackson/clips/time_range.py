@@ -21,6 +21,10 @@ def span(
     """
     begin = start_s or 0.0
     end = info.duration_s if end_s is None else min(end_s, info.duration_s)
+    if begin >= info.duration_s:
+        raise BadConfiguration(
+            f"{info.path}: {info.duration_s:.2f} s long: nothing is shown from {begin:g} s on"
+        )
     if begin >= end:
         raise BadConfiguration(
             f"{info.path}: no range from {begin:g} s to {end:g} s in {info.duration_s:.2f} s"

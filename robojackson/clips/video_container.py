@@ -16,6 +16,7 @@ from av.video.stream import VideoStream
 from jaxtyping import Float
 
 from robojackson.errors import TruncatedVideo, UnreadableVideo
+from robojackson.files.file_kinds import TABLE, kind_of
 
 ISO_MEDIA_MARK = b"ftyp"
 CONTAINERS = (
@@ -73,8 +74,11 @@ def require_file(path: Path) -> None:
     """Raise `UnreadableVideo` where there is no file that could be a video."""
     if path.is_dir():
         raise UnreadableVideo("a folder, expected one video", path)
+    if path.parts[:1] in (("http:",), ("https:",)):
+        raise UnreadableVideo("an address, expected a file; `robojackson dance` downloads", path)
     if not path.is_file():
-        raise UnreadableVideo("no such file", path)
+        kind = "neither a file nor a folder" if path.exists() else "no such file"
+        raise UnreadableVideo(kind, path)
     if path.stat().st_size == 0:
         raise UnreadableVideo("the file is empty (0 bytes)", path)
 
@@ -84,6 +88,9 @@ def _unreadable(head: bytes, sounds: bool) -> str:
     for start, kind in LISTS.items():
         if text.startswith(start) or (start in text and text.startswith(b"<?xml")):
             return f"{kind}, which names other files; give the video itself"
+    if kind := kind_of(head):
+        goes_on = "; `robojackson retarget` goes on from a motion" if kind == TABLE else ""
+        return f"{kind}, not a video{goes_on}"
     return f"not a video {'or sound ' if sounds else ''}that FFmpeg can read"
 
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from pydantic import ValidationError
 
 from robojackson.errors import BadTable
+from robojackson.files.file_kinds import NETWORKS, kind_of
 from robojackson.files.foreign_file import parse_json, refuse_video
 from robojackson.files.table_types import Column, Facts, TableSchema
 
@@ -61,6 +62,9 @@ def _parquet(data: bytes, where: str | Path) -> Iterator[None]:
     try:
         yield
     except (pa.ArrowException, OSError, ValueError) as cause:
+        if kind := kind_of(data):
+            order = "; in which order does --help list the arguments?" if kind == NETWORKS else ""
+            raise BadTable(f"{kind}, not a table (Parquet){order}", where) from cause
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"not a Parquet file ({reason})", where) from cause
 

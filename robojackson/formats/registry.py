@@ -3,6 +3,7 @@
 A new format is one file beside this one, with `EXPORT`, `IMPORT` or both (see `format`).
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
@@ -35,6 +36,8 @@ KNOWN_TO_FAIL: Mapping[bytes, str] = {
     b"\x1f\x8b": "compressed with gzip; unpack it first",
 }
 """First bytes of files that cannot be read, and the remedy."""
+NUMBERS = re.compile(rb"-?\d[\d.e+-]*([,;\t ]+-?\d[\d.e+-]*){3}")
+"""The first row of a table without names."""
 
 
 def robot_exporters() -> Mapping[str, RobotExporter]:
@@ -74,6 +77,10 @@ def recognise(data: bytes, where: str) -> Importer:
             return importer
     if content.pickled:
         raise UnknownName("keys of a pickle", ", ".join(content.pickled)[:200], where, importers())
+    if NUMBERS.match(data[:256]):
+        raise BadTable(
+            f"{where}: rows of numbers without names, such as a robot's motion; a person's is read"
+        )
     text = " ".join(data[:16].decode("latin1").split())
     shown = text if text.isprintable() else data[:16].hex(" ")
     raise UnknownName("kind of file", shown, where, importers())

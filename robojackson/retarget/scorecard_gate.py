@@ -30,24 +30,31 @@ LEAST_FEASIBLE = 1.0 - BARS["infeasible_share"]
 """Least share of feasible steps."""
 
 _FINDINGS = 2  # that an error message lists
+_TELLING = ("nan_count", "fallen_share", "infeasible_share")
+"""Figures that explain the others, the most telling first."""
 _TRIM = "(`robojackson dance CLIP --start S --end S`)"
+_SLOWER = "a slower tempo (--set retarget.tempo=0.7)"
+_OPEN = "not to repeat it (--set retarget.cyclic=no)"
+_FEET = f"a range of the clip in which both feet are in view {_TRIM}, or --method optimise"
 _MENDING = {
-    "infeasible_share": f"tempo: auto, a shorter range of the clip {_TRIM}, or a stronger robot",
+    "infeasible_share": f"{_SLOWER}, a shorter range of the clip {_TRIM}, or another robot",
     "fallen_share": f"a range of the clip without it {_TRIM}",
-    "seam_deg": "cyclic: no",
-    "seam_mm": "cyclic: no",
-    "seam_speed_rad_s": "cyclic: no",
-    "speed_over_limit": "a slower tempo",
-    "planted_slip_cm_s": "method: optimise, or better contact labels",
-    "contact_gap_mm": "method: optimise, or better contact labels",
-    "unsupported_share": "method: optimise, or better contact labels",
+    "seam_deg": _OPEN,
+    "seam_mm": _OPEN,
+    "seam_speed_rad_s": _OPEN,
+    "speed_over_limit": _SLOWER,
+    "planted_slip_cm_s": _FEET,
+    "planted_slip_p95_cm_s": _FEET,
+    "contact_gap_mm": _FEET,
+    "unsupported_share": _FEET,
 }
 
 
 def failures(card: Mapping[str, float]) -> list[str]:
-    """Return the names of the gated figures over their bars; a missing or non-finite figure
-    fails."""
-    found = {name: card.get(name) for name in BARS}
+    """Return the names of the gated figures over their bars, the most telling first; a missing or
+    non-finite figure fails."""
+    order = (*_TELLING, *(name for name in BARS if name not in _TELLING))
+    found = {name: card.get(name) for name in order}
     return [name for name, x in found.items() if x is None or not x <= BARS[name]]
 
 
@@ -78,7 +85,7 @@ def check(card: Mapping[str, Any]) -> None:
         raise RejectedReference(
             f"reference refused: {name} is {value:.4g}, at most {BARS[name]:g} is "
             f"allowed{others}{_reasons(name, card)}",
-            f"try {_MENDING.get(name, 'method: optimise')}",
+            f"try {_MENDING.get(name, '--method optimise')}",
             figure=name,
             value=value,
             limit=BARS[name],
@@ -91,5 +98,7 @@ def _reasons(name: str, card: Mapping[str, Any]) -> str:
     findings = card.get("findings", ())
     if name not in ("infeasible_share", "fallen_share") or not findings:
         return ""
+    if name == "fallen_share":
+        findings = sorted(findings, key=lambda each: "a fall" not in each)
     more = f" (and {len(findings) - _FINDINGS} more)" if len(findings) > _FINDINGS else ""
     return ": " + ", ".join(findings[:_FINDINGS]) + more

@@ -99,7 +99,7 @@ def train_policy(
     try:
         if not run.finished():
             trainer.learn(run.callback)
-        elif choice is not as_trained and not _is_chosen(out):
+        elif newest_checkpoint(out) is None or (choice is not as_trained and not _is_chosen(out)):
             run.checkpoint(choice)
     except BudgetSpent:
         run.checkpoint(choice)

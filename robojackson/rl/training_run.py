@@ -19,7 +19,6 @@ from robojackson.rl import checkpoint_folder, walkers
 from robojackson.rl.checkpoint_folder import newest_checkpoint, write_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
-from robojackson.rl.modes.track_mode import control_of
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import outline_facts, require_same_path
 from robojackson.rl.tensorboard_log import ScalarLog
@@ -34,10 +33,6 @@ log = logging.getLogger(__name__)
 
 RECENT_EPISODES = 100
 RECENT_FIGURES = ("survived_s", "episode_return", "site_error_m")
-NOT_OF_THE_RUN = (
-    *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
-)
-"""Keys that may differ between two sittings."""
 
 
 class Run:
@@ -68,7 +63,7 @@ class Run:
             return
         with checkpoint_folder.restoring(folder):
             state = json.loads((folder / "run.json").read_text())
-            self.task.require_same(state["configuration"], self._identity(), folder)
+            self.task.require_same(state["configuration"], self.task.identity(self.config), folder)
             require_same_path(self.out / "policy.safetensors", self.core.clip.outline)
             trainer.load(folder, self._replay, state["steps"], state["updates"])
             with np.load(folder / "environment.npz", allow_pickle=False) as arrays:
@@ -145,15 +140,6 @@ class Run:
             self.finished(),
         )
 
-    def _identity(self) -> dict[str, object]:
-        """Return the configuration without the budget, which a continued run must share."""
-        fields = asdict(self.config)
-        fields["track"]["control"] = asdict(control_of(self.config.track))
-        for free in NOT_OF_THE_RUN:
-            del fields[free]
-        result: dict[str, object] = json.loads(json.dumps(fields | {"task": asdict(self.task)}))
-        return result
-
     def _save(self, folder: Path) -> None:
         """Write everything needed to continue into a folder."""
         self.trainer.save(folder, self._replay)
@@ -163,7 +149,7 @@ class Run:
 
     def _state(self) -> dict[str, object]:
         return {
-            "configuration": self._identity(),
+            "configuration": self.task.identity(self.config),
             "steps": self.trainer.steps(),
             "updates": self.trainer.updates(),
             "seconds": self._budget.seconds(),

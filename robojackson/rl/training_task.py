@@ -9,9 +9,16 @@ from typing import Any
 
 from robojackson.errors import BadConfiguration
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of, poses_sha256
+from robojackson.rl.checkpoint_folder import newest_checkpoint, restoring
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.modes.track_mode import control_of
 from robojackson.robot.description import description_sha256
 from robojackson.robot.model import Robot
 
+NOT_OF_THE_RUN = (
+    *("steps", "minutes", "cpu_minutes", "checkpoint_seconds", "progress_seconds", "tensorboard"),
+)
+"""Keys that may differ between two sittings."""
 OLDER_TQC = {"n_steps": 1}
 """Numbers of TQC from before they could be chosen."""
 OLDER_RANDOM = {"least": 1.0}
@@ -57,6 +64,30 @@ class Task:
             description_sha256(robot.description),
             tuple(robot.description.imu),
         )
+
+    def identity(self, config: TrainConfig) -> dict[str, object]:
+        """Return the task and the configuration without the budget: what a training that goes on
+        must share."""
+        fields = asdict(config)
+        fields["track"]["control"] = asdict(control_of(config.track))
+        for free in NOT_OF_THE_RUN:
+            del fields[free]
+        result: dict[str, object] = json.loads(json.dumps(fields | {"task": asdict(self)}))
+        return result
+
+    def require_own(self, out: Path, config: TrainConfig) -> None:
+        """Raise where a folder holds a checkpoint that another training wrote.
+
+        Raises:
+            BadConfiguration: the message names what differs.
+            StoreError: the checkpoint is damaged.
+        """
+        folder = newest_checkpoint(out)
+        if folder is None:
+            return
+        with restoring(folder):
+            kept = json.loads((folder / "run.json").read_text())["configuration"]
+            self.require_same(kept, self.identity(config), folder)
 
     def require_same(
         self, kept: Mapping[str, object], now: Mapping[str, object], folder: Path

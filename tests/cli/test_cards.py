@@ -33,50 +33,6 @@ def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_reported() -> 
     ]
 
 
-def test_advice_stands_a_line_each_in_its_words() -> None:
-    facts = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
-    assert cards.advice_lines(facts) == ["advice    more light", "advice    nearer"]
-    assert cards.advice_lines({}) == []
-
-
-MOTION = {
-    "frames": 120, "fps": 30.0, "person": 1, "detected": 110, "contact_share": {"left_heel": 0.4},
-    "notes": (), "smpl": "smpl.parquet",
-    "floor": {"lowest_keypoint_m": 0.0, "gravity": "network", "tilt_deg": 12.0,
-              "gravity_sd_deg": 6.2, "gravity_sure": False},
-}  # fmt: skip
-
-
-def test_a_motion_says_how_sure_it_is_of_gravity() -> None:
-    text = "\n".join(cards.mocap_lines(MOTION))
-    assert "from the body alone, not sure: within 6 degrees; the camera is tilted by 12" in text
-    known = MOTION["floor"] | {"gravity": "scene", "gravity_sd_deg": 1.4, "gravity_sure": True}  # type: ignore[operator]
-    text = "\n".join(cards.mocap_lines(MOTION | {"floor": known}))
-    assert "from straight edges of the room, sure: within 1 degrees" in text
-
-
-def test_weak_stretches_are_advised_against_until_they_are_left_out() -> None:
-    found = {
-        "median_m": 0.02,
-        "weak_s": [(1.0, 1.2), (1.3, 1.5)],
-        "filled_s": [(2.0, 2.5)],
-        "left_out": False,
-    }
-    text = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found}))
-    assert "weak      1.0-1.5 s (leave them out: --set mocap.leave_out_weak=true)" in text
-    assert "filled in 2.0-2.5 s" in text
-    text = "\n".join(cards.mocap_lines(MOTION | {"reprojection": found | {"left_out": True}}))
-    assert "weak      1.0-1.5 s" in text
-    assert "--set" not in text
-
-
-@pytest.mark.parametrize(
-    ("detected", "kind"), [(100, "whole"), (95, "whole"), (80, "gaps"), (30, "poor")]
-)
-def test_a_motion_is_rated_by_how_much_was_detected(detected: int, kind: str) -> None:
-    assert cards.mocap_verdict(100, detected)["kind"] == kind
-
-
 def test_the_card_has_a_bar_for_every_gated_figure_and_ends_with_the_verdict() -> None:
     answer = RETARGETED | {"scorecard": CARD, "verdict": cards.retarget_verdict(CARD)}
     lines = cards.retarget_lines(answer)

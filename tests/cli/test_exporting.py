@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robojackson.cli.cards import command_line
-from robojackson.cli.exporting import export
+from robojackson.cli.exporting import export, has_screen
 from robojackson.cli.training_words import pack_of
 from robojackson.errors import RejectedReference, StoreError, UnknownName
 from robojackson.files import tables
@@ -102,6 +102,25 @@ def test_a_format_for_persons_does_not_fit_a_robot(reference: Path, tmp_path: Pa
     assert not (tmp_path / "motion.bvh").exists()
 
 
+@pytest.mark.medium
+def test_no_file_of_a_stage_is_replaced(reference: Path, tmp_path: Path) -> None:
+    kept = tmp_path / "smpl.parquet"
+    kept.write_bytes(b"motion of a person")
+    with pytest.raises(StoreError, match="is what a stage wrote"):
+        export(reference, "csv", kept)
+    assert kept.read_bytes() == b"motion of a person"
+
+
+@pytest.mark.parametrize(("display", "screen"), [("", False), (":0", True)])
+def test_a_window_is_offered_where_one_can_be_opened(
+    display: str, screen: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", display)
+    assert has_screen() is screen
+
+
 def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "reference.parquet"
     path.write_bytes(tables.encode(replace(robot_motion("hip_shake"), model_sha256="0" * 64)))
@@ -116,7 +135,7 @@ def test_a_missing_reference_is_reported(tmp_path: Path) -> None:
 
 def test_a_format_of_motions_does_not_fit_a_policy(tmp_path: Path) -> None:
     (tmp_path / "policy.safetensors").write_bytes(b"")
-    with pytest.raises(UnknownName, match=r"holds a policy\)\. Known: onnx"):
+    with pytest.raises(UnknownName, match=r"holds a policy\)\. Known: deploy, onnx"):
         export(tmp_path / "policy.safetensors", "bvh", tmp_path / "motion.bvh")
 
 

@@ -61,7 +61,7 @@ def test_two_cameras_have_no_range(tmp_path: Path) -> None:
 @pytest.mark.medium
 def test_a_range_beyond_the_video_is_one_line(tmp_path: Path) -> None:
     with (
-        pytest.raises(BadConfiguration, match="no range from 9 s"),
+        pytest.raises(BadConfiguration, match="long: nothing is shown from 9 s on"),
         video_range(CLIP, None, tmp_path / "out", (9.0, None), "base", {}),
     ):
         pass

@@ -8,7 +8,7 @@ import pytest
 
 from robojackson import formats
 from robojackson.cli.exporting import names
-from robojackson.errors import UnknownName
+from robojackson.errors import BadTable, UnknownName
 from robojackson.formats import registry
 from tests.fixtures.person import person
 
@@ -55,6 +55,11 @@ def test_no_two_modules_declare_the_same_format() -> None:
     kinds = (registry.robot_exporters, registry.person_exporters, registry.policy_exporters)
     declared = sum(len(kind()) for kind in (*kinds, registry.importers))
     assert declared == len(registry._formats())
+
+
+def test_rows_of_numbers_are_named_as_such() -> None:
+    with pytest.raises(BadTable, match="rows of numbers without names"):
+        registry.recognise(b"-0.0720,0.0,0.79,1.0\n", "x.csv")
 
 
 @pytest.mark.parametrize(

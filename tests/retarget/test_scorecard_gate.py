@@ -1,5 +1,6 @@
 """Red team: no spoilt motion passes the gate, and the message names the figure."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from robojackson.errors import RejectedReference
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import score
-from robojackson.retarget.scorecard_gate import check
+from robojackson.retarget.scorecard_gate import BARS, check
 from robojackson.retarget.targets.cycle import human_clip
 from robojackson.retarget.targets.keypoint_targets import Targets, targets
 from robojackson.robot.model import Robot
@@ -111,6 +112,30 @@ def test_levitation_without_contact_labels_is_refused_too(robot: Robot):
     assert card["contact_gap_mm"] == 0.0
     with pytest.raises(RejectedReference, match="unsupported_share"):
         check(card)
+
+
+def test_of_several_figures_the_one_that_explains_the_others_is_named_first():
+    card = dict.fromkeys(BARS, 0.0) | {"contact_gap_mm": 6.3, "fallen_share": 1.0}
+    findings = ["steps 0-199: body not over its feet", "steps 0-199: tilted 104 degrees: a fall"]
+    with pytest.raises(RejectedReference, match="fallen_share is 1") as refused:
+        check({**card, "findings": findings})
+    message = str(refused.value)
+    assert message.index("a fall") < message.index("not over its feet")
+    assert "(and contact_gap_mm)" in message
+
+
+@pytest.mark.parametrize("figure", sorted(BARS))
+def test_a_remedy_is_something_that_can_be_typed(figure: str):
+    with pytest.raises(RejectedReference) as refused:
+        check({**dict.fromkeys(BARS, 0.0), figure: 1e3})
+    assert re.search(r"--(set retarget\.\w+=|start|method)", refused.value.remedy)
+
+
+def test_a_refusal_can_be_given_more_advice():
+    error = RejectedReference("refused", "try less", figure="seam_mm", value=9.0, forcible=True)
+    more = error.advised(["the picture is upside down"])
+    assert str(more) == "refused; try less; the picture is upside down, or --force"
+    assert (more.figure, more.value) == ("seam_mm", 9.0)
 
 
 def test_a_card_without_figures_is_refused():

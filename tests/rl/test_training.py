@@ -265,6 +265,28 @@ def test_a_checkpoint_of_another_configuration_is_refused(
 
 
 @pytest.mark.medium
+def test_another_training_s_folder_is_refused_before_any_work(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    result, _, _, name = trained
+    task = Task.of(sway, robot)
+    task.require_own(result.policy.parent, dataclasses.replace(brief(name), steps=9999))
+    task.require_own(tmp_path, brief(name))
+    with pytest.raises(BadConfiguration, match=r"seed: 0 there, 5 here"):
+        task.require_own(result.policy.parent, dataclasses.replace(brief(name), seed=5))
+
+
+@pytest.mark.medium
+def test_a_budget_that_is_over_before_the_first_round_leaves_a_policy_that_has_learnt_nothing(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    config = dataclasses.replace(brief("sbx"), steps=None, minutes=1e-6)
+    result = run(robot, sway, config, tmp_path)
+    assert (result.steps, result.updates) == (0, 0)
+    assert load_policy(result.policy).facts["updates"] == 0
+
+
+@pytest.mark.medium
 def test_a_robot_whose_yaml_was_changed_between_two_sittings_is_refused(
     trained: tuple, robot: Robot, sway: ReferenceMotion
 ) -> None:

@@ -16,8 +16,10 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 Kind = Literal[
     "frame_rate", "too_short", "person_small", "body_outside", "person_missing", "people",
-    "camera_moves", "dark", "blurred",
+    "camera_moves", "dark", "blurred", "head_down",
 ]  # fmt: skip
+HALF_TURN = "if the picture is upside down, turn it: ffmpeg -i IN -vf hflip,vflip OUT.mp4"
+QUARTER_TURN = "if the picture lies on its side, turn it: ffmpeg -i IN -vf transpose=1 OUT.mp4"
 LIMITS: Mapping[Kind, float] = {
     "frame_rate": 20.0,
     "too_short": 2.0,
@@ -28,14 +30,15 @@ LIMITS: Mapping[Kind, float] = {
     "camera_moves": 0.02,
     "dark": 0.2,
     "blurred": 0.14,
+    "head_down": 0.5,
 }
 """Where advice begins: frames a second, seconds, pixels, share of the frames with a person, share
-of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail. Under
-two seconds are too short to evaluate; the pixels are those of a search's filter; the last two are
-half of what the bundled clips have at the worst."""
+of all frames, a count, share of the image's diagonal, grey level 0..1, share of fine detail, share
+of the frames with a person. Under two seconds are too short to evaluate; the pixels are those of a
+search's filter; grey level and detail are half of what the bundled clips have at the worst."""
 SHORT_GAP_S = 0.25
 """A gap that motion capture fills without harm."""
-AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves")
+AT_MOST: tuple[Kind, ...] = ("body_outside", "people", "camera_moves", "head_down")
 """Figures that are advised against above their limit; the others below it."""
 
 
@@ -83,6 +86,7 @@ def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
     height = float(np.median(heights_px(track)[seen])) if seen.any() else None
     moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
     return {
+        "head_down": _head_down(track) if seen.any() else None,
         "person_missing": float(seen.mean()) if len(track) else None,
         "people": float(track.people),
         "body_outside": _outside(track) if seen.any() else None,
@@ -111,6 +115,17 @@ def _outside(track: LandmarkTrack) -> float:
     """Return the share of the frames with a person in which head, trunk or legs leave the image."""
     xy = track.landmarks[track.detected][:, indices(BODY), :2]
     return float(((xy < 0.0) | (xy > 1.0)).any((1, 2)).mean())
+
+
+def _head_down(track: LandmarkTrack) -> float:
+    """Return the share of the frames with a person whose ankles are above the shoulders in the
+    picture."""
+    heights = track.landmarks[track.detected][..., 1]
+    ankles, shoulders = (
+        heights[:, indices((f"left_{name}", f"right_{name}"))].mean(1)
+        for name in ("ankle", "shoulder")
+    )
+    return float((ankles < shoulders).mean())
 
 
 def _in_sight(range_s: tuple[float, float] | None) -> str:
@@ -143,4 +158,5 @@ _WORDS: Mapping[Kind, Callable[[Advice], str]] = {
         f"the picture is blurred, {a.value:.0%} of its contrast is detail: clean the lens, focus "
         "on the dancer, use more light"
     ),
+    "head_down": lambda a: f"the person is head down in {a.value:.0%} of the frames; {HALF_TURN}",
 }

@@ -118,9 +118,11 @@ def _kind(
     seconds: float,
     updates: int | None,
 ) -> Kind:
+    if seconds < SHORTEST_S:
+        return "too_short"
     if updates == 0:
         return "untrained"
-    if seconds < SHORTEST_S or baseline_success >= EASY:
+    if baseline_success >= EASY:
         return "too_short"
     if own["strict_success"] >= DANCES:
         return "dances"

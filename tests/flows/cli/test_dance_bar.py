@@ -26,7 +26,7 @@ def test_on_a_terminal_it_says_what_training_gets_and_no_other_line(
     with dance_bar.dance_bar(6.0, tmp_path):
         log.info(BUDGET, 2.6, 6.0, 10.0)
         log.info("%d steps", 512)
-    assert "training gets 2.6 of 6 min; dances of this length need about 10" in result.getvalue()
+    assert "training gets 2.6 min, the pass 6; dances of this length" in result.getvalue()
     assert "512 steps" not in result.getvalue()
     assert not any(isinstance(each, dance_bar._Budget) for each in log.handlers)
 
