@@ -71,6 +71,11 @@ def score_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
+def advice_lines(answer: Answer) -> list[str]:
+    """Return advice for filming the clip again, a line each."""
+    return [f"advice    {each['words']}" for each in answer.get("advice", ())]
+
+
 def retarget_lines(answer: Answer) -> list[str]:
     """Return the card of a reference motion: ten lines with bars, and the verdict."""
     card = answer["scorecard"]

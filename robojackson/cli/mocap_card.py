@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from robojackson.cli.cards import closing
+from robojackson.cli.cards import advice_lines, closing
 from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN
 
 if TYPE_CHECKING:
@@ -120,11 +120,6 @@ def _parts(parts: Sequence[tuple[float, float]]) -> str:
         else:
             joined.append([start, end])
     return ", ".join(f"{start:.1f}-{end:.1f} s" for start, end in joined)
-
-
-def advice_lines(answer: Answer) -> list[str]:
-    """Return advice for filming the clip again, a line each."""
-    return [f"advice    {each['words']}" for each in answer.get("advice", ())]
 
 
 def mocap_verdict(answer: Answer) -> dict[str, str]:

@@ -33,6 +33,12 @@ def test_the_steadiest_video_is_marked_and_what_cannot_be_read_is_reported() -> 
     ]
 
 
+def test_advice_stands_a_line_each_in_its_words() -> None:
+    facts = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
+    assert cards.advice_lines(facts) == ["advice    more light", "advice    nearer"]
+    assert cards.advice_lines({}) == []
+
+
 def test_the_card_has_a_bar_for_every_gated_figure_and_ends_with_the_verdict() -> None:
     answer = RETARGETED | {"scorecard": CARD, "verdict": cards.retarget_verdict(CARD)}
     lines = cards.retarget_lines(answer)

@@ -5,12 +5,6 @@ import pytest
 from robojackson.cli import mocap_card
 
 
-def test_advice_stands_a_line_each_in_its_words() -> None:
-    facts = {"advice": [{"kind": "dark", "words": "more light"}, {"words": "nearer"}]}
-    assert mocap_card.advice_lines(facts) == ["advice    more light", "advice    nearer"]
-    assert mocap_card.advice_lines({}) == []
-
-
 MOTION = {
     "frames": 120, "fps": 30.0, "person": 1, "detected": 110, "contact_share": {"left_heel": 0.4},
     "notes": (), "smpl": "smpl.parquet", "advice": (), "next": "robojackson retarget smpl.parquet",

@@ -23,6 +23,7 @@ STATUE = {"statue": figures(1.6, 0.0, 0.0)}
         (figures(1.9, 1.0), STATUE, 1.9, 5, "too_short"),
         (figures(10, 1.0), {"random": figures(9, 0.9)}, 10.0, 5, "too_short"),
         (figures(1.0, 0.0), STATUE, 10.0, 0, "untrained"),
+        (figures(1.0, 1.0), STATUE, 1.0, 0, "too_short"),
         (figures(10, 1.0), STATUE, 10.0, None, "dances"),
     ],
 )
