@@ -1,15 +1,14 @@
 """Output of `mocap`: what was recovered, how far it may be trusted, and what comes next."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
-from robojackson.cli.cards import advice_lines, closing
+from robojackson.cli.cards import Answer, advice_lines, closing
 from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
 
-Answer = Mapping[str, Any]
 WHOLE, MOSTLY = 0.95, 0.7
 """Shares of frames with the person from which a motion counts as whole, or as having gaps."""
 CUT_OFF = 0.5
@@ -32,7 +31,7 @@ def contact_shares(sequence: "SmplSequence") -> dict[str, float]:
     return dict(zip(CONTACT_POINTS, map(float, shares), strict=True))
 
 
-def floor_figures(sequence: "SmplSequence") -> dict[str, Any]:
+def floor_figures(sequence: "SmplSequence") -> dict[str, object]:
     """Return the source of the floor, the distance of the lowest keypoint from it, metres, and the
     shares of the frames in which the trunk lies or hangs."""
     import numpy as np
@@ -72,7 +71,7 @@ def mocap_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
-def judged(answer: dict[str, Any]) -> dict[str, Any]:
+def judged(answer: dict[str, object]) -> dict[str, object]:
     """Return the answer with its verdict; without a next command where that would be refused."""
     verdict = mocap_verdict(answer)
     if verdict["kind"] == "short":

@@ -4,7 +4,6 @@ import pytest
 
 from robojackson.cli import mocap_card
 
-
 MOTION = {
     "frames": 120, "fps": 30.0, "person": 1, "detected": 110, "contact_share": {"left_heel": 0.4},
     "notes": (), "smpl": "smpl.parquet", "advice": (), "next": "robojackson retarget smpl.parquet",
