@@ -65,6 +65,10 @@ def test_work_is_done_in_another_process_that_is_kept() -> None:
     assert first == in_video_process(number, Path()) != os.getpid()
 
 
+def test_its_heap_does_not_grow_with_every_thread() -> None:
+    assert in_video_process(os.getenv, "MALLOC_ARENA_MAX") == "2"
+
+
 def test_the_properties_of_a_video_are_the_same() -> None:
     assert probed(CLIP, VideoLimits()) == probe(CLIP, VideoLimits())
 
