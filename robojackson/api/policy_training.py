@@ -135,8 +135,9 @@ def _trained(
 ) -> TrainedPolicy:
     """Train in a folder that is locked meanwhile; its table is saved in any case."""
     with without_empty_folders(folder), results_in(folder) as files, locked(folder):
-        Task.of(motion, robot).require_own(folder, config)
-        rows = EpisodeLog(files, labels, resumes=newest_checkpoint(folder) is not None)
+        if resumes := newest_checkpoint(folder) is not None:
+            Task.of(motion, robot).require_own(folder, config)
+        rows = EpisodeLog(files, labels, resumes=resumes)
         audit = audit_record(audit_both_readings(robot, motion, config.environment))
         hooks.audited(audit)
         try:
