@@ -19,7 +19,7 @@ Kind = Literal[
     "camera_moves", "dark", "blurred", "head_down",
 ]  # fmt: skip
 HALF_TURN = "if the picture is upside down, turn it: ffmpeg -i IN -vf hflip,vflip OUT.mp4"
-QUARTER_TURN = "if the picture lies on its side, turn it: ffmpeg -i IN -vf transpose=1 OUT.mp4 (or 2)"
+QUARTER_TURN = "if the picture is on its side, turn it: ffmpeg -i IN -vf transpose=1 OUT.mp4 (or 2)"
 LIMITS: Mapping[Kind, float] = {
     "frame_rate": 20.0,
     "too_short": 2.0,
