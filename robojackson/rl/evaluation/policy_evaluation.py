@@ -109,7 +109,7 @@ def evaluate_policy(
     summaries: dict[str, dict[str, float]] = {}
     qpos = np.zeros((0, robot.model.nq))
     for name, driver in drivers(policy, reference, robot, config.seed).items():
-        tick = partial(progress, name)
+        tick = partial(progress, _who(policy).get("tracker", name) if name == TRAINED else name)
         whole = fall.relative and name == TRAINED
         done = roll_out(
             robot, clip, driver, starts, horizon, config.threads, fall, meter, tick, whole

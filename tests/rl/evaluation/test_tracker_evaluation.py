@@ -94,8 +94,12 @@ def test_a_stand_in_network_gets_rows_and_a_name(
     tmp_path: Path, robot: Robot, sway: ReferenceMotion
 ) -> None:
     file, description = stand_in(tmp_path)
-    found = evaluate_policy(Twist2Tracker(description, file), sway, robot, FEW)
+    named: set[str] = set()
+    tracker = Twist2Tracker(description, file)
+    found = evaluate_policy(tracker, sway, robot, FEW, lambda name, *_: named.add(name))
     assert found.summary["tracker"] == "standin"
+    assert "standin" in named
+    assert "trained" not in named
     assert sum(row["policy"] == "trained" for row in found.rows) == 3
     assert set(found.summary["baselines"]) == {"statue", "mean_pose", "zero_residual", "random"}
     assert 0 < found.summary["survived_s"] <= 0.6
