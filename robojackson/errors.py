@@ -150,9 +150,10 @@ class RejectedReference(RoboJacksonError):
     def advised(self, words: Iterable[str]) -> "RejectedReference":
         """Return the error with more that may mend it."""
         remedy = "; ".join(filter(None, [self.remedy, *words]))
-        error = RejectedReference(self.reason, remedy, forcible=self.forcible)
-        error.figure, error.value, error.limit = self.figure, self.value, self.limit
-        return error
+        return RejectedReference(
+            self.reason, remedy,
+            figure=self.figure, value=self.value, limit=self.limit, forcible=self.forcible,
+        )  # fmt: skip
 
     def saved_in(self, folder: object) -> "RejectedReference":
         """Return the error with the place of the motion that was refused."""

@@ -106,7 +106,7 @@ def mocap(
             data, lines = list_people(shown, out, config, overrides)
             return CommandResult(data, text=lines)
         made = stages.mocap(shown, out, config, overrides, hypotheses, second)
-        made = mocap_card.judged(made | draw_mocap(shown, out, config, overrides, film))
+        made = mocap_card.with_verdict(made | draw_mocap(shown, out, config, overrides, film))
     return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))
 
 

@@ -71,7 +71,7 @@ def mocap_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
-def judged(answer: dict[str, object]) -> dict[str, object]:
+def with_verdict(answer: dict[str, object]) -> dict[str, object]:
     """Return the answer with its verdict; without a next command where that would be refused."""
     verdict = mocap_verdict(answer)
     if verdict["kind"] == "short":

@@ -54,9 +54,9 @@ def test_weak_stretches_are_advised_against_until_they_are_left_out() -> None:
 def test_the_verdict_is_the_gravest_reason_for_doubt(changes: dict, kind: str) -> None:
     answer = MOTION | {"detected": 120} | changes
     answer["floor"] = MOTION["floor"] | changes.get("floor", {})  # type: ignore[operator]
-    judged = mocap_card.judged(answer)
-    assert judged["verdict"]["kind"] == kind
-    assert ("next" in judged) == (kind != "short")
+    found = mocap_card.with_verdict(answer)
+    assert found["verdict"]["kind"] == kind
+    assert ("next" in found) == (kind != "short")
 
 
 def test_a_turned_picture_is_named_with_the_command_that_turns_it() -> None:
