@@ -77,7 +77,7 @@ MOVES = {
     "g1_dance_b": Move("clips/dance_b.mp4", 15, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32),
     "g1_walk_recaptured": Move("clips/walk.mp4", 15, 0.98, 0.93, 0.7, robot="g1", mpjpe_mm=23),
     "g1_dance_b_recaptured": Move(
-        "clips/dance_b.mp4", 15, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32
+        "clips/dance_b.mp4", 5, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32
     ),
     "g1_dance_a": Move("clips/dance_a.mp4", 30, 0.88, 0.75, 0.55, False, robot="g1", mpjpe_mm=55),
     "g1_dance_a_loop": Move("clips/dance_a.mp4", 5, 0.88, 0.75, 0.55, robot="g1", mpjpe_mm=55),

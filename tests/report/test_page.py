@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.body.skeleton import keypoint
 from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
@@ -16,6 +17,7 @@ from robojackson.report.pages.evaluation_text import beat_rows, next_step
 from robojackson.report.pages.page_content import (
     TO_COME,
     Results,
+    limb_directions,
     limb_rows,
     page_content,
     versions,
@@ -38,7 +40,8 @@ SUMMARY = {
 @pytest.fixture
 def results(sequence: SmplSequence, reference: ReferenceMotion) -> Results:
     rows = [
-        {"policy": policy, "phase": phase, "reset": reset, "survived_s": 3.0 * (1 + reset)}
+        {"policy": policy, "phase": phase, "reset": reset, "survived_s": 3.0 * (1 + reset),
+         "clip_fraction": (1 + reset) / 4}
         for policy in POLICIES for phase in (0, 9, 18) for reset in range(3)
     ]  # fmt: skip
     episodes = [
@@ -165,6 +168,33 @@ def test_errors_by_limb_end_with_the_rollout(results: Results) -> None:
     rows = {row.title: row.values for row in limb_rows(replace(results, player=shown))}
     assert rows["head"][2] == "200 mm"
     assert rows["left foot"][2] == "–"
+
+
+def test_a_robot_at_the_dancers_wrists_and_ankles_points_its_limbs_as_the_dancer(
+    sequence: SmplSequence, reference: ReferenceMotion
+) -> None:
+    """The hand and the foot of a robot follow them, not the fingers and the ball of the foot."""
+    frames = np.round(np.asarray(reference.source_time_s) * sequence.fps).astype(int)
+    person = np.asarray(sequence.keypoints_w, float)[np.clip(frames, 0, len(sequence) - 1)]
+    names = ("pelvis", "head") + tuple(
+        f"{side}_{part}"
+        for side in ("left", "right")
+        for part in ("shoulder", "hand", "hip", "foot")
+    )
+    humans = [name.replace("hand", "wrist").replace("foot", "ankle") for name in names]
+    points = person[:, [keypoint(name) for name in humans]]
+    robots = replace(reference, keypoints_w=points, keypoint_names=names)
+    found = limb_directions(sequence, robots)
+    assert max(found.values()) < 0.1
+
+
+def test_the_survival_of_a_motion_that_ends_is_beside_what_is_left_of_it(results: Results) -> None:
+    rows = [{**row, "clip_fraction": 0.5} for row in results.evaluations]
+    axes = run_plots.survival_by_phase(rows, 0.02).axes[0]
+    up = [bar.get_height() for bar in axes.patches]
+    np.testing.assert_allclose(up, 6.0)  # the mean of 3, 6 and 9 s
+    marks = [line[0, 1] for part in axes.collections for line in part.get_segments()]
+    np.testing.assert_allclose(marks, 3 * [18.0])
 
 
 @pytest.mark.parametrize("figure", ["lean_deg", "keypoint_leaned_mm"])

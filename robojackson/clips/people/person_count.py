@@ -56,7 +56,8 @@ class People:
     @property
     def typical(self) -> int:
         """Number of people visible in at least a third of the examined frames."""
-        return int(np.percentile(self.counts, 67, method="lower")) if self.counts else 0
+        most_first = sorted(self.counts, reverse=True)
+        return most_first[-(-len(most_first) // 3) - 1] if most_first else 0
 
     def _count(self, image: np.ndarray, xy: np.ndarray) -> int:
         factor = min(1.0, self._config.short_side / min(image.shape[:2]))

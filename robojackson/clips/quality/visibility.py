@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.ndimage import binary_dilation
 
 from robojackson.clips.people.person_extent import POINTS, indices
 from robojackson.errors import NoPersonFound
@@ -84,7 +85,7 @@ def turned_away(track: LandmarkTrack) -> Bool[np.ndarray, " T"]:
 def steady(track: LandmarkTrack) -> Float[np.ndarray, " T"]:
     """Return 1, less in the frames beside a gap, where the detector is about to lose the person."""
     lost = ~track.detected
-    near = np.convolve(lost, np.ones(2 * GAP_FRAMES + 1), mode="same")[: len(lost)] > 0
+    near = binary_dilation(lost, iterations=GAP_FRAMES)
     return np.where(near, BESIDE_GAP, 1.0)
 
 

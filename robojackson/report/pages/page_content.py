@@ -32,12 +32,13 @@ NOTHING = 0.01
 """Slack that is too small to be seen, tolerances."""
 LIMBS = {
     "head": ("pelvis", "head"),
-    "left_hand": ("left_shoulder", "left_hand"),
-    "right_hand": ("right_shoulder", "right_hand"),
-    "left_foot": ("left_hip", "left_foot"),
-    "right_foot": ("right_hip", "right_foot"),
+    "left_hand": ("left_shoulder", "left_wrist"),
+    "right_hand": ("right_shoulder", "right_wrist"),
+    "left_foot": ("left_hip", "left_ankle"),
+    "right_foot": ("right_hip", "right_ankle"),
 }
-"""The ends of each limb by its name, as keypoints of the dancer and of robots."""
+"""The ends of each limb by its keypoint of robots: the dancer's, which the robot's follow
+(`retarget.targets.keypoint_targets`)."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,8 @@ def _plots(results: Results) -> list[Plot]:
         dancer = dancer_of(results.evaluation)
         figure = run_plots.survival_by_phase(results.evaluations, reference.dt, dancer)
         caption = (
-            "Mean survival from every start phase: a low bar is a moment at which it cannot begin."
+            "Mean survival from every start phase: a bar far below the mark where its rollouts "
+            "end is a moment at which it cannot begin."
         )
         made.append(_plot("Survival by start phase", caption, figure))
     if any(key.startswith("limb_gain_") for key in results.evaluation):

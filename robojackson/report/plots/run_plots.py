@@ -56,8 +56,8 @@ def training_curve(episodes: Sequence[Row], dt: float) -> Figure:
 def survival_by_phase(
     rows: Sequence[Row], dt: float, dancer: str = POLICY_TITLES[TRAINED][0]
 ) -> Figure:
-    """Plot the mean survival from each start phase: the dancer as bars, under another control law
-    as a dashed line, its baselines as lines.
+    """Plot the mean survival from each start phase: the dancer as bars below a mark where its
+    rollouts end, under another control law as a dashed line, its baselines as lines.
     """
     figure, (axes,) = figure_of(7.0, 2.8)
     for policy in dict.fromkeys(str(row["policy"]) for row in rows):
@@ -69,6 +69,8 @@ def survival_by_phase(
             width = 0.8 * dt * float(np.diff(phases).min()) if len(phases) > 1 else 0.1
             place = phases * dt
             axes.bar(place, mean, width, align="edge", color=ACCENT, label=dancer)
+            whole = [max(_whole_s(r) for r in chosen if r["phase"] == p) for p in phases]
+            axes.hlines(whole, place, place + width, color=INK, lw=1, label="to the end")
         elif policy in VARIANTS:
             title = f"{dancer}, {title}"
             axes.plot(phases * dt, mean, ".--", lw=1, color=SECOND, label=title)
@@ -79,6 +81,12 @@ def survival_by_phase(
     axes.set_ylabel("survival, s")
     legend(axes)
     return figure
+
+
+def _whole_s(row: Row) -> float:
+    """Return how long a rollout is from which no robot falls, seconds; 0 where it fell at once."""
+    share = float(row["clip_fraction"])
+    return float(row["survived_s"]) / share if share else 0.0
 
 
 def limb_gains(summary: Mapping[str, Any]) -> Figure:

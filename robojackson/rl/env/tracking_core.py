@@ -89,7 +89,8 @@ class TrackingCore:
     def reseed(self, seed: int) -> None:
         """Restart the random numbers and reset the learnt starts, which determines the next `reset`
         and everything after it."""
-        self.rng = np.random.default_rng(seed)
+        self.rng, self.episode = np.random.default_rng(seed), 0
+        self.sim.disturbances.restart(seed)
         self.mode.forget()
 
     def reset(self) -> Float[np.ndarray, "N D"]:

@@ -104,17 +104,20 @@ class TrackingEnv(gym.Env[np.ndarray, np.ndarray]):
         self, robot: Robot, reference: ReferenceMotion, config: TrackConfig | PaperConfig
     ) -> None:
         self._make = partial(TrackingCore, robot, reference, config, 1)
-        self.core = self._make(0)
+        self.core, self._seeded = self._make(0), False
         self.observation_space, self.action_space = _spaces(self.core)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Start a new episode; return its observation and an empty info."""
+        """Start a new episode; return its observation and an empty info. Without a seed the first
+        one begins by chance."""
         super().reset(seed=seed)
+        if seed is None and not self._seeded:
+            seed = int(self.np_random.integers(2**31))
         if seed is not None:
             self.core.close()
-            self.core = self._make(seed)
+            self.core, self._seeded = self._make(seed), True
         return self.core.reset()[0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:

@@ -122,9 +122,9 @@ def evaluate_policy(
     own = summaries.pop(TRAINED)
     variants = {name: summaries.pop(name) for name in VARIANTS if name in summaries}
     reward = reward_report(robot, reference, environment, own, float(horizon.mean()))
-    length = config.seconds if clip.cyclic else clip.steps * clip.dt
+    seconds = float(horizon.mean()) * clip.dt
     updates = policy.updates if isinstance(policy, Policy) else None
-    verdict = verdict_on(own, summaries, length, updates)
+    verdict = verdict_on(own, summaries, seconds, updates)
     shown: dict[str, object] = dict(own)
     baselines: dict[str, object] = dict(summaries)
     if verdict.kind == "too_short":

@@ -8,6 +8,7 @@ from robojackson.geometry.rotations import heading, wrapped
 from robojackson.metrics.dance_score import heading_score
 from robojackson.metrics.joint_position_error import acceleration_ratio, mpjpe
 from robojackson.metrics.rollout_score import (
+    STILL_M,
     best_frozen_error,
     heading_frame,
     limb_response,
@@ -44,6 +45,8 @@ class RolloutScorer:
         self._limbs = {name: names.index(name) for name in LIMB_ENDS}
         self._model, self._joints = robot.model, robot.joint_names
         self._tempo = tempo_beside_clip(reference.scorecard)
+        points = heading_frame(reference.keypoints_w, reference.qpos[:, 3:7], self._pelvis)
+        self._moves = best_frozen_error(points) > STILL_M
 
     def row(
         self, policy: str, label: tuple[int, int], rollouts: Rollouts, i: int
@@ -72,7 +75,7 @@ class RolloutScorer:
             "on_floor": found.floor,
             "end_height_error_m": found.worst_end_m,
             "site_error_m": float(error.mean()),
-            "skill": 0.0 if fell else skill(float(error.mean()), best_frozen_error(there)),
+            "skill": self._skill(float(error.mean()), there, fell),
             "integrator": mujoco.mjtIntegrator(self._model.opt.integrator).name.removeprefix(
                 "mjINT_"
             ),
@@ -84,6 +87,13 @@ class RolloutScorer:
         row |= self._whereabouts(rollouts, i, span) | self._limb_figures(here, there)
         return row | self._usage(rollouts, i, span)
 
+    def _skill(self, error_m: float, there: np.ndarray, fell: bool) -> float:
+        """Return the skill, 0 for a robot that falls; NaN where the reference hardly moves, whether
+        the robot falls or not."""
+        if not self._moves:
+            return float("nan")
+        return 0.0 if fell else skill(error_m, best_frozen_error(there))
+
     def _velocity_score(self, rollouts: Rollouts, i: int, span: slice) -> float:
         """Return the velocity score along the heading, path included; at most 0 for a robot that
         falls."""
@@ -93,7 +103,7 @@ class RolloutScorer:
             rollouts.target[span, i],
             rollouts.target_qpos[span, i, 3:7],
         )
-        if not rollouts.fell[i]:
+        if not rollouts.fell[i] or not self._moves:
             return score
         return 0.0 if np.isnan(score) else min(score, 0.0)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Kind = Literal["too_short", "untrained", "falls", "learning", "partly", "dances"]
-SHORTEST_S = 2.0
-"""Rollouts shorter than this are not evaluated: a body that does nothing does not fall that
-fast."""
+SHORTEST_S = 1.75
+"""Mean length below which rollouts are not evaluated: a body that does nothing does not fall that
+fast. Those of a motion of two seconds that ends are as long, since they begin in its first
+quarter."""
 EASY = 0.5
 """Strict success of a body that does not dance above which an evaluation is meaningless."""
 DANCES = 0.95
@@ -16,6 +17,9 @@ DANCES = 0.95
 PARTLY = 0.5
 NO_BETTER = 1.25
 """Factor on the best baseline's survival up to which a robot counts as no better."""
+UPRIGHT = 0.9
+"""Share of a rollout's length from which a robot that is up for so long does not count as falling,
+whatever its baselines do."""
 LONGER_MINUTES = 15.0
 """Least budget that a pass is advised to take whose robot does not dance, minutes."""
 NEEDS_FULL_LENGTH = ("success", "strict_success", "skill")
@@ -34,7 +38,7 @@ class Verdict:
 
     Attributes:
         kind: Name of the verdict.
-        seconds: Length of a rollout, seconds.
+        seconds: Mean length of the rollouts, seconds.
         survived_s: Mean survival of the policy, seconds.
         strict_success: Strict success of the policy, 0..1.
         skill: Skill of the policy; 1 is perfect.
@@ -100,7 +104,8 @@ def verdict_on(
     Args:
         own: Means over its rollouts: survived_s, strict_success, skill.
         baselines: The same of bodies that do not dance, by name.
-        seconds: Length of a rollout that does not end early, seconds.
+        seconds: Mean length of rollouts that do not end early, seconds: of a motion that ends,
+            those that begin later are shorter.
         updates: Gradient updates of its training; None where unknown.
     """
     survived = {name: found["survived_s"] for name, found in baselines.items()}
@@ -128,7 +133,8 @@ def _kind(
         return "dances"
     if own["strict_success"] >= PARTLY:
         return "partly"
-    return "falls" if own["survived_s"] <= NO_BETTER * baseline_s else "learning"
+    most_s = min(NO_BETTER * baseline_s, UPRIGHT * seconds)
+    return "falls" if own["survived_s"] <= most_s else "learning"
 
 
 def longer_minutes(minutes: float) -> float:

@@ -54,6 +54,11 @@ class Disturbances:
         self.count = np.zeros(1, int)
         self.push_at = self._waits(self._rng(0))
 
+    def restart(self, seed: int) -> None:
+        """Begin with the random numbers of a seed, at no control step."""
+        self._seed, self.count[:] = seed, 0
+        self.push_at[:] = self._waits(self._rng(0))
+
     def sense(
         self, qpos: Float[np.ndarray, "N nq"], qvel: Float[np.ndarray, "N nv"]
     ) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:

@@ -94,7 +94,7 @@ class Simulation:
         actuation: Nominal gains and action scale, as written into a policy's file.
         qpos, qvel: State of every copy after the last `step` or `place`.
         previous: Targets of the previous control step; at first the own angles, or no torque.
-        count, push_at: Counters of the disturbances (`Disturbances`).
+        disturbances: Pushes and sensor noise; count, push_at are its counters.
         root_estimate: Of copies that do not know where their root is; None where they do.
         broken: Copies whose state diverged since they were placed, so that MuJoCo reset them.
         points: Positions of the keypoint sites, world, in step with `qpos`.
@@ -130,9 +130,9 @@ class Simulation:
             self._delay = np.round(share * rng.integers(longest + 1, size=n)).astype(int)
         most = control.substeps or 1
         self._delay = np.minimum(self._delay + round(delay_s / model.opt.timestep), most)
-        self._disturbances = Disturbances(random, n, self.dt, seed)
+        self.disturbances = Disturbances(random, n, self.dt, seed)
         self.previous = np.zeros((n, model.nu))
-        self.count, self.push_at = self._disturbances.count, self._disturbances.push_at
+        self.count, self.push_at = self.disturbances.count, self.disturbances.push_at
         self.datas = [mujoco.MjData(own) for own in self._models]
         self._views = Views.of(self.datas)
         self.residual = residual_scale(robot, control)
@@ -183,7 +183,7 @@ class Simulation:
             for job in jobs:
                 job.result()
         self.previous[:] = targets
-        self._disturbances.after_step(self.datas, rows)
+        self.disturbances.after_step(self.datas, rows)
         raised = np.concatenate(self._views.warnings).reshape(self.n, -1)
         self.broken = np.any(raised[:, BAD_STATE] > 0, axis=1)
         self._gather_all()
@@ -192,7 +192,7 @@ class Simulation:
 
     def sensed(self) -> tuple[Float[np.ndarray, "N nq"], Float[np.ndarray, "N nv"]]:
         """Return qpos and qvel as the sensors measure them."""
-        return self._disturbances.sense(self.qpos, self.qvel)
+        return self.disturbances.sense(self.qpos, self.qvel)
 
     def reference_angles(self, step: ClipStep) -> Float[np.ndarray, "N nu"]:
         """Return the target hinge angles of a reference step without a policy, rad."""
@@ -210,7 +210,7 @@ class Simulation:
         """Return the offsets of the targets by the feedback, rad."""
         if self.root_estimate is None:
             return feedback(*self.sensed())
-        noise = self._disturbances.accelerometer_noise()
+        noise = self.disturbances.accelerometer_noise()
         estimate = self.root_estimate.of(*self.sensed(), feedback.path(), noise)
         return feedback(*estimate, beside_feet=True)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robojackson.clips.quality.visibility import turned_away, weigh_visibility
+from robojackson.clips.quality.visibility import BESIDE_GAP, steady, turned_away, weigh_visibility
 from robojackson.errors import NoPersonFound
 from robojackson.motion.landmark_track import LandmarkTrack
 from tests.fixtures.made_people import SIZE, row_of
@@ -82,3 +82,11 @@ def test_frames_beside_a_gap_are_less_certain() -> None:
 
 def test_a_clip_without_a_person_is_left_to_the_next_stage() -> None:
     assert not weigh_visibility(track_of(standing() * np.nan)).detected.any()
+
+
+@pytest.mark.parametrize("frames", [4, 20])
+def test_two_frames_beside_a_gap_count_less_however_short_the_clip(frames: int) -> None:
+    rows = standing(frames=frames)
+    rows[-1] = np.nan
+    expected = np.where(np.arange(frames) < frames - 3, 1.0, BESIDE_GAP)
+    np.testing.assert_array_equal(steady(track_of(rows)), expected)

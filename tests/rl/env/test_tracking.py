@@ -9,6 +9,7 @@ from stable_baselines3.common.env_checker import check_env as check_sb3
 from robojackson.errors import BadPolicy, UnknownName
 from robojackson.geometry.rotations import heading
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.track_config import RandomConfig
 from robojackson.rl.config.train_config import (
     ResetConfig,
     RewardConfig,
@@ -221,6 +222,29 @@ def test_the_default_stand_touches_the_floor_and_faces_as_requested(robot: Robot
     np.testing.assert_allclose(feet[:, 2] - robot.contact_radii, 0.0, atol=1e-9)
     np.testing.assert_allclose(turned[:2], [1.0, 2.0])
     assert heading(turned[3:7]) == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize(
+    "random", [RandomConfig(), RandomConfig(sensor_noise=1.0, pushes=1.0)], ids=["plain", "noisy"]
+)
+def test_a_seed_decides_everything_after_it(
+    robot: Robot, sway: ReferenceMotion, random: RandomConfig
+) -> None:
+    one = TrackingCore(robot, sway, TrackConfig(observation="onboard", random=random), 4, 0)
+    seen = []
+    for _ in range(2):
+        one.reseed(7)
+        first = one.reset()
+        still = np.zeros((4, one.action_size))
+        seen.append([first, *(one.step(still).observation for _ in range(90))])
+    np.testing.assert_array_equal(*seen)
+
+
+def test_environments_without_a_seed_begin_differently(robot: Robot, sway: ReferenceMotion) -> None:
+    first, second, third, same = (TrackingEnv(robot, sway, TrackConfig()) for _ in range(4))
+    assert not np.array_equal(first.reset()[0], second.reset()[0])
+    np.testing.assert_array_equal(third.reset(seed=3)[0], same.reset(seed=3)[0])
+    np.testing.assert_array_equal(third.reset()[0], same.reset()[0])
 
 
 def test_start_phases_go_where_episodes_fail(sway: ReferenceMotion) -> None:

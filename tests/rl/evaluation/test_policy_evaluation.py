@@ -28,6 +28,8 @@ from robojackson.robot.model import Robot, load_robot
 from tests.fixtures.deploy_policies import random_policy
 
 STEPS = 160
+STATE = ("qpos", "keypoints_w")
+"""Arrays of a motion's poses."""
 
 
 def perfect(sway: ReferenceMotion) -> Rollouts:
@@ -64,6 +66,32 @@ def test_the_reference_itself_is_a_strict_success_of_skill_one(
     assert (scored["success"], scored["strict_success"], scored["clip_fraction"]) == (1, 1, 1)
     assert scored["skill"] == pytest.approx(1)
     assert scored["limb_gain_left_hand"] == pytest.approx(1)
+
+
+def test_a_motion_that_hardly_moves_has_no_skill_of_robots_that_fall_either(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    fields = {name: np.repeat(getattr(sway, name)[:1], len(sway), 0) for name in STATE}
+    still = dataclasses.replace(sway, **fields)
+    upright = perfect(still)
+    fallen = dataclasses.replace(upright, fell=np.array([True]), length=np.array([40]))
+    for rollouts in (upright, fallen):
+        scored = row(robot, still, rollouts)
+        assert np.isnan([scored["skill"], scored["velocity_score"]]).all()
+    moving = dataclasses.replace(perfect(sway), fell=np.array([True]), length=np.array([40]))
+    assert row(robot, sway, moving)["skill"] == 0
+
+
+def test_a_robot_that_never_falls_is_up_for_all_of_its_rollouts(
+    robot: Robot, sway: ReferenceMotion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rollouts of a motion that ends begin in its first quarter: they are shorter than it."""
+    monkeypatch.setattr(Fall, "has_fallen", lambda self, qpos, there: np.zeros(len(qpos), bool))
+    ending = dataclasses.replace(sway, cyclic=False)
+    config = EvaluateConfig(phases=4, resets=1)
+    found = evaluate_policy(idle(robot, sway), ending, robot, config).summary
+    assert found["verdict"]["seconds"] == pytest.approx(found["survived_s"])
+    assert found["clip_fraction"] == 1
 
 
 @pytest.mark.parametrize(
