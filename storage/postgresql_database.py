@@ -95,6 +95,17 @@ class PostgreSQL:
         """
         self._run("pg_restore", "--list", str(dump), server=False)
 
+    def require_unused(self) -> None:
+        """Raise where a Prefect server uses the database.
+
+        Raises:
+            BackupFailed: it has other connections.
+        """
+        if users := self._count(USERS):
+            raise BackupFailed(
+                f"{self.address}: {users} connections use the database; stop the Prefect server"
+            )
+
     def load(self, dump: Path) -> None:
         """Replace the tables by those of a dump, in one transaction.
 
@@ -102,10 +113,7 @@ class PostgreSQL:
             BackupFailed: a Prefect server uses the database, or it refuses the dump; nothing is
                 changed.
         """
-        if users := self._count(USERS):
-            raise BackupFailed(
-                f"{self.address}: {users} connections use the database; stop the Prefect server"
-            )
+        self.require_unused()
         replace = ("--clean", "--if-exists", "--single-transaction", *_OF_NO_ROLE)
         self._run("pg_restore", *replace, "--dbname", self.access["PGDATABASE"], str(dump))
 

@@ -40,6 +40,9 @@ class Database(Protocol):
     def require_readable(self, dump: Path) -> None:
         """Raise when a dump cannot be loaded."""
 
+    def require_unused(self) -> None:
+        """Raise where a Prefect server uses the database, so that a dump cannot be loaded."""
+
     def load(self, dump: Path) -> None:
         """Replace what is in the database by a dump, all of it or nothing."""
 

@@ -63,6 +63,17 @@ class SQLite:
         if found != ("ok",):
             raise BackupFailed(f"{dump}: {found[0]}")
 
+    def require_unused(self) -> None:
+        """Raise where a server writes to the file.
+
+        Raises:
+            BackupFailed: it is locked.
+        """
+        if self.path.is_file():
+            with _writable(self.path) as database:
+                database.execute("BEGIN IMMEDIATE")
+                database.rollback()
+
     def load(self, dump: Path) -> None:
         """Replace the content of the file, in one transaction.
 

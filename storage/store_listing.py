@@ -92,6 +92,7 @@ def _remote(url: str) -> dict[str, str | None]:
 
 def key_of(store: Store, path: Path) -> str | None:
     """Return the key of a path in a local store; None elsewhere."""
-    if isinstance(store.place, LocalFolder) and path.absolute().is_relative_to(store.place.root):
-        return path.absolute().relative_to(store.place.root).as_posix()
-    return None
+    if not isinstance(store.place, LocalFolder):
+        return None
+    inside, root = path.resolve(), store.place.root.resolve()
+    return inside.relative_to(root).as_posix() if inside.is_relative_to(root) else None

@@ -45,7 +45,8 @@ def restore(
         name: Name of the backup; the newest without one.
         force: Replace what is in a store and a database that are not empty.
     Raises:
-        BackupFailed: the backup is damaged or the target is not empty; nothing is written.
+        BackupFailed: the backup is damaged, or the target is not empty or in use; nothing is
+            written.
     """
     manifest = backups.read(name)
     dump = manifest.database
@@ -60,6 +61,7 @@ def restore(
     _verify(backups, manifest, report)
     if dump is not None:
         database.require_readable(backups.path(dump.content))
+        database.require_unused()
     store.create()
     progress = Progress("restored", len(manifest.files))
 

@@ -23,6 +23,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.modes.track_mode import is_fed
+from robojackson.rl.tensorboard_log import LOGS
 from robojackson.robot.model import RobotDescription
 from storage.artifact import Artifact
 from storage.store import Store
@@ -116,6 +117,8 @@ async def train_policy(
             "policy": store.save("train", "policy.safetensors", work / "policy.safetensors"),
             "episodes": store.save("train", "episodes.parquet", work / "episodes.parquet"),
         }
+        for log in sorted((work / LOGS).glob("*")):  # beside what is cached
+            store.put(f"{LOGS}/{run_id}/{log.name}", log)
         shutil.rmtree(work, ignore_errors=True)
     return kept
 
@@ -165,7 +168,8 @@ def _command(
     run_id: str,
     minutes: float | None,
 ) -> list[str]:
-    setup = work / f"{labels.setup}.yaml"
+    setup = work / "setup" / f"{labels.setup}.yaml"  # a setup may have any name
+    setup.parent.mkdir(exist_ok=True)
     setup.write_text(yaml.safe_dump(to_json_types(config)))
     options = {
         "--out": work,

@@ -127,7 +127,7 @@ def dance(
         require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())
     made = _danced(found or str(source), config, overrides, start, end, settings)
-    return _concluded(made, settings.minutes, settings.evaluate.seconds)
+    return _concluded(made, settings)
 
 
 def _danced(
@@ -168,26 +168,21 @@ def instant_minutes(settings: "PipelineConfig") -> float:
     return INSTANT_MINUTES + (SEARCH_MINUTES if searches else 0.0)
 
 
-def _concluded(made: dict[str, Any], minutes: float, seconds: float) -> CommandResult:
+def _concluded(made: dict[str, Any], settings: "PipelineConfig") -> CommandResult:
     """Return the answer of a dance with its verdict and the command to type next."""
     from robojackson.cli.cards import advice_lines, closing
     from robojackson.cli.stages import verdict_lines
 
     verdict = made["evaluation"]["verdict"]
-    made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], minutes, seconds)}
+    made |= {"verdict": verdict, "next": _next(verdict["kind"], made["page"], settings)}
     where = [f"page   {made['page']}", f"video  {made['video']}"]
     beats = table(made["beats"], BEATS) if made["beats"] else []
     text = [*verdict_lines(made["evaluation"]), *beats, *advice_lines(made), *where, *closing(made)]
     return CommandResult(made, text=text)
 
 
-def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
-    """Return what to type after a dance.
-
-    Args:
-        minutes: Budget of the pass.
-        seconds: Longest rollout that the settings allow.
-    """
+def _next(kind: str, page: str, settings: "PipelineConfig") -> str:
+    """Return what to type after a dance."""
     if kind == "dances":
         from robojackson.cli.lifetime.interruption import python
 
@@ -197,16 +192,20 @@ def _next(kind: str, page: str, minutes: float, seconds: float) -> str:
 
         return shlex.join([program(), *(word for word in sys.argv[1:] if word != INSTANT)])
     if kind == "too_short":
-        from robojackson.cli.lifetime.interruption import same_command
+        from robojackson.cli.lifetime.interruption import with_settings
         from robojackson.rl.evaluation.verdict import SHORTEST_S
 
-        if seconds < SHORTEST_S:  # the clip may be long enough
-            return f"{same_command()} --set evaluate.seconds={LONG_ENOUGH_S:g}"
+        if settings.evaluate.seconds < SHORTEST_S:  # the clip may be long enough
+            return with_settings({"evaluate.seconds": f"{LONG_ENOUGH_S:g}"})
         return "film or choose a range of at least two seconds (--start, --end)"
-    from robojackson.cli.lifetime.interruption import with_option
+    from robojackson.cli.lifetime.interruption import with_option, with_settings
+    from robojackson.rl.config.train_config import BUDGETS
     from robojackson.rl.evaluation.verdict import longer_minutes
 
-    return with_option("--minutes", f"{longer_minutes(minutes):g}")
+    budgets = {f"train.{name}": getattr(settings.train, name) for name in BUDGETS}
+    if longer := {key: f"{2 * value:.12g}" for key, value in budgets.items() if value is not None}:
+        return with_settings(longer)  # the minutes of the pass do not count beside these
+    return with_option("--minutes", f"{longer_minutes(settings.minutes):g}", unset=("minutes",))
 
 
 app = make_app()

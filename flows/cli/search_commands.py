@@ -94,11 +94,14 @@ def catalogue(
     from flows.search import ranking_table
     from robojackson.cli import console
     from robojackson.cli.cards import closing
+    from robojackson.errors import BadConfiguration
     from storage import candidate_catalogue
     from storage.store import Store
 
     log_to_stderr()
     store = Store.from_environment()
+    if sql is not None and dance is not None:
+        raise BadConfiguration("--dance and --sql: give one; SQL names a dance by itself")
     if sql is not None:
         found = candidate_catalogue.query(store, sql)
         named = {str(number): row for number, row in enumerate(found, 1)}

@@ -9,6 +9,7 @@ from pathlib import Path
 from robojackson.errors import StoreError
 from robojackson.files.foreign_file import read_json, read_text
 from robojackson.formats.deploy.licence_passport import (
+    OF_CLIP,
     UNKNOWN,
     Ingredient,
     robot_ingredient,
@@ -83,7 +84,7 @@ def motion_ingredient(reference: Path, digest: str) -> Ingredient:
     name, record = "reference motion", _record_of(reference)
     if "imported" in record:
         clip = clip_ingredient(reference)
-        note = f"retargeted here from {clip.name}, whose licence it has"
+        note = f"retargeted here from {clip.name}, {OF_CLIP}"
         return Ingredient("motion", name, clip.licence, note, digest)
     if "video" in record or _folder_with(reference, LANDMARKS):
         return Ingredient("motion", name, "own", "made here, from the clip", digest)

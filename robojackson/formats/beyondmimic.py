@@ -41,7 +41,7 @@ def motion_arrays(motion: SampledMotion, model: mujoco.MjModel) -> dict[str, np.
         "body_ang_vel_w": states.angular[:, 1:],
     }
     return (
-        {"fps": np.array([round(motion.fps)])}
+        {"fps": np.array([int(motion.fps) if float(motion.fps).is_integer() else motion.fps])}
         | {name: values.astype(np.float32) for name, values in figures.items()}
         | {"joint_names": np.array(names(model, "joint")[1:])}
         | {"body_names": np.array(names(model, "body")[1:])}

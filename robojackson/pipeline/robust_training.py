@@ -53,10 +53,7 @@ def robust_training(config: TrainConfig, description: RobotDescription) -> dict[
 
 
 def with_defaults(added: Mapping[str, object], given: Mapping[str, object]) -> dict[str, object]:
-    """Return overrides in the order in which they apply: given sections, then what is added to
-    them unless they say otherwise, then the other given ones. Text is read as YAML."""
+    """Return overrides with what is added to the given ones unless they say otherwise. Text is read
+    as YAML."""
     said = {key for key, _ in leaves(parsed_overrides(given))}
-    new = {key: value for key, value in added.items() if key not in said}
-    above = {key for key in given if any(one.startswith(f"{key}.") for one in new)}
-    sections = {key: value for key, value in given.items() if key in above}
-    return {**sections, **new, **{key: given[key] for key in given if key not in above}}
+    return {key: value for key, value in added.items() if key not in said} | dict(given)

@@ -42,7 +42,8 @@ def load(
     Args:
         cls: A frozen pydantic dataclass.
         name_or_path: `base`, `robots/humanoid`, or the path of a YAML file; None is no file.
-        overrides: Values by key path (`{"train.seed": 3}`); text is read as YAML.
+        overrides: Values by key path (`{"train.seed": 3}`); text is read as YAML. A whole section
+            applies before the keys within it, whatever their order.
     Raises:
         UnknownName: no such file.
         BadConfiguration: an unknown key, a wrong value, or no YAML.
@@ -50,8 +51,8 @@ def load(
     path = None if name_or_path is None else _found(cls, name_or_path)
     values, places = _read_extended(path) if path else ({}, {})
     given = parsed_overrides(overrides or {})
-    for key_path, value in given.items():
-        _set(values, key_path.split("."), value)
+    for key_path in sorted(given, key=lambda path: path.count(".")):
+        _set(values, key_path.split("."), given[key_path])
     where = display_name(path) if path else "--set"
     try:
         return TypeAdapter(cls).validate_python(values)

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from robojackson.errors import MissingDependency
 
+LOGS = "tensorboard"
+"""Folder of the logs of a training."""
+
 
 class ScalarLog:
     """One event file in a folder.

@@ -21,7 +21,7 @@ from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.policy import Policy
 from robojackson.rl.policy_facts import outline_facts, require_same_path
-from robojackson.rl.tensorboard_log import ScalarLog
+from robojackson.rl.tensorboard_log import LOGS, ScalarLog
 from robojackson.rl.tqc.actor_average import ActorAverage
 from robojackson.rl.tqc.network_arrays import Networks, Tensors
 from robojackson.rl.tqc.trainer import Trainer
@@ -50,7 +50,7 @@ class Run:
         self._recent: deque[Row] = deque(maxlen=RECENT_EPISODES)
         self._budget, self._has_learnt = TrainingBudget(config), False
         self._saved = self._reported = time.monotonic()
-        self._scalars = ScalarLog(out / "tensorboard") if config.tensorboard else None
+        self._scalars = ScalarLog(out / LOGS) if config.tensorboard else None
         self.callback = _Callback(self)
         self._average = ActorAverage(config.tqc.actor_average)
 

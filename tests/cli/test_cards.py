@@ -99,10 +99,13 @@ def test_an_option_takes_the_place_of_its_earlier_value(
     assert result == "robojackson dance a.mp4 --minutes 15"
 
 
-@pytest.mark.parametrize("words", [["--steps", "100"], ["--minutes=3", "--steps=100"]])
+@pytest.mark.parametrize(
+    "words",
+    [["--steps", "100"], ["--minutes=3", "--steps=100"], ["--set", "steps=100", "--set=minutes=5"]],
+)
 def test_another_budget_takes_the_place_of_one_that_was_too_small(
     words: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interruption.sys, "argv", ["robojackson", "train", "a.parquet", *words])
-    result = interruption.with_option("--minutes", "10", without=("--steps",))
+    result = interruption.with_option("--minutes", "10", ("--steps",), ("steps", "minutes"))
     assert result == "robojackson train a.parquet --minutes 10"

@@ -166,6 +166,17 @@ def test_beyondmimic_has_the_keys_and_types_that_its_loader_reads(
     }
 
 
+@pytest.mark.parametrize("fps", [50.0, 1 / 0.015])
+def test_beyondmimic_states_the_frame_rate_that_a_pack_has(
+    swaying: ReferenceMotion, model: mujoco.MjModel, fps: float
+) -> None:
+    """A robot of 15 ms a control step has no whole number of frames a second."""
+    motion = SampledMotion(fps, np.array(swaying.qpos), np.array(swaying.qvel))
+    found = beyondmimic.motion_arrays(motion, model)["fps"]
+    assert found.item() == pytest.approx(fps)
+    assert (found.dtype.kind == "i") == fps.is_integer()
+
+
 def test_beyondmimic_velocities_are_the_change_of_the_positions(
     swaying: ReferenceMotion, model: mujoco.MjModel
 ) -> None:

@@ -1,4 +1,4 @@
-"""The settings of `--robust` and the order in which they apply."""
+"""The settings of `--robust` beside given ones."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +14,10 @@ from robojackson.rl.evaluation.passport import ROBUST
 from tests.fixtures.deploy_policies import swaying
 
 
-def test_sections_come_first_then_what_is_added_then_the_rest() -> None:
+def test_what_is_added_gives_way_to_what_is_given() -> None:
     added = {"a.b": 1, "c.d": 2, "e": 3}
     given = {"c.d": 9, "a": {"x": 7}, "f": 8}
-    assert list(with_defaults(added, given).items()) == [
-        ("a", {"x": 7}), ("a.b", 1), ("e", 3), ("c.d", 9), ("f", 8)
-    ]  # fmt: skip
+    assert with_defaults(added, given) == {"a.b": 1, "e": 3, **given}
     for section in ({"b": 5}, "{b: 5}"):
         assert with_defaults(added, {"a": section}) == {"a": section, "c.d": 2, "e": 3}
 

@@ -311,3 +311,11 @@ def test_a_base_that_cannot_be_is_reported_with_the_file_that_names_it(
 def test_a_key_of_one_section_is_found_there() -> None:
     with pytest.raises(BadConfiguration, match=r"'phases'\. Did you mean 'evaluate\.phases'\?"):
         yaml_loader.load(PipelineConfig, "base", {"phases": 24})
+
+
+@pytest.mark.parametrize("section_first", [True, False])
+def test_a_key_wins_over_its_whole_section(section_first: bool) -> None:
+    """An option such as --seed is a key; a section that is typed after it must not undo it."""
+    given: list[tuple[str, object]] = [("train", "{steps: 100000}"), ("train.seed", 5)]
+    found = yaml_loader.load(PipelineConfig, "base", dict(given if section_first else given[::-1]))
+    assert (found.train.seed, found.train.steps) == (5, 100_000)

@@ -376,6 +376,8 @@ def test_force_replaces_what_the_backup_has_and_leaves_the_rest(
 def test_a_folder_of_backups_is_not_in_the_store(local: Store) -> None:
     with pytest.raises(BackupFailed, match="is in the store"):
         backed_up(local, Backups(Path(local.root) / "backups"))
+    with pytest.raises(BackupFailed, match="is in the store"):
+        backed_up(local, Backups(Path(local.root) / ".." / Path(local.root).name / "backups"))
 
 
 def test_a_store_that_does_not_exist_is_not_backed_up(backups: Backups, tmp_path: Path) -> None:
@@ -511,3 +513,5 @@ def test_a_database_that_is_locked_is_one_line(
         live.execute("BEGIN IMMEDIATE")
         with pytest.raises(RoboJacksonError, match="locked; stop the Prefect server"):
             restored(target, backups, force=True)
+    left = [key for key in content(target) if not key.startswith("prefect/prefect.db")]
+    assert not left  # so that the same command works once the server has stopped

@@ -1,17 +1,23 @@
 """A training is a process of its own: it leaves no orphan, and its death has a name."""
 
 import asyncio
+import json
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
 
 from robojackson.errors import TrainingFailed
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.robot.description import RobotDescription
+from storage.store import Store
 from tasks import train_policy
 from tasks.runtime import child_process
 from tests.fixtures.robots import robot_motion
@@ -137,3 +143,42 @@ def test_a_training_on_top_of_feedback_has_time_for_its_search(
     found = train_policy._overtime_s(reference, describe_robot(name), TrainConfig(mode="track"))
     search_s = train_policy.SEARCH_S_A_SECOND * len(motion) * motion.dt
     assert found == pytest.approx(train_policy.OVERTIME_S + (search_s if searches else 0.0))
+
+
+def test_a_setup_may_have_the_name_of_another_file_of_the_training(tmp_path: Path) -> None:
+    labels = train_policy.RunLabels("walk", "robot")
+    description, config = describe_robot("humanoid"), TrainConfig(seed=7)
+    words = train_policy._command(tmp_path, tmp_path, description, config, labels, "run", 1.0)
+    named = {key: Path(words[words.index(key) + 1]) for key in ("--setup", "--robot")}
+    assert load(TrainConfig, str(named["--setup"])).seed == 7
+    assert load(RobotDescription, str(named["--robot"])).name == "humanoid"
+
+
+def test_the_logs_of_a_training_are_kept_in_the_store(
+    store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(store_folder).create()
+
+    async def trained(command: object, run_id: str, work: Path, limit_s: object) -> bytes:
+        for name in ("policy.safetensors", "episodes.parquet", "tensorboard/events.1"):
+            (work / name).parent.mkdir(exist_ok=True)
+            (work / name).write_bytes(b"made")
+        facts = {"trainer": "sb3", "seed": 0, "steps": 1, "updates": 0, "stopped": "steps"}
+        return json.dumps({**facts, "episodes": 0, "seconds": 1}).encode()
+
+    @asynccontextmanager
+    async def silent(*words: object) -> AsyncIterator[None]:
+        yield
+
+    monkeypatch.setattr(train_policy, "run_process", trained)
+    monkeypatch.setattr(train_policy, "show_progress", silent)
+    with store.scratch() as folder:
+        path = robot_motion("hip_shake").save(folder / "reference.parquet")
+        reference = store.save("retarget", "reference.parquet", path)
+    labels = train_policy.RunLabels("hip_shake", "scratch")
+    config = TrainConfig(steps=10, tensorboard=True)
+    robot = describe_robot("humanoid")
+    asyncio.run(train_policy.train_policy.fn(reference, robot, config, labels))
+    (log,) = store.list("tensorboard")
+    assert log.endswith("/events.1")
+    assert store.read(log) == b"made"

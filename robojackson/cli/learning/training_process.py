@@ -86,12 +86,15 @@ def _answer(
     trained: "TrainedPolicy", reference: Path, policy: Path, robot: str | None
 ) -> dict[str, Any]:
     """Return the command's answer about a finished training."""
+    from robojackson.rl.config.train_config import BUDGETS
+
     config = trained.config
     survived = [row["survived_s"] for row in trained.episodes[-RECENT:]]
     verdict = cards.train_verdict(trained.updates, trained.steps, survived)
     following = cards.command_line("evaluate", policy, reference, *cards.of_robot(robot))
     if verdict["kind"] == "untrained":
-        following = with_option("--minutes", f"{USUAL_MINUTES:g}", without=("--steps",))
+        minutes = f"{USUAL_MINUTES:g}"
+        following = with_option("--minutes", minutes, without=("--steps",), unset=BUDGETS)
     return {
         "policy": str(policy),
         "reference": str(reference),

@@ -5,6 +5,7 @@ all 348, the others with weight zero. `track` imitates the bundled walk, on any 
 a robot for which none ships is saved where `start: walker` finds it.
 """
 
+import hashlib
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -15,7 +16,7 @@ import numpy as np
 
 from robojackson.cli import stages
 from robojackson.cli.learning import training_process
-from robojackson.errors import BadConfiguration
+from robojackson.errors import BadConfiguration, RejectedReference
 from robojackson.files import tables
 from robojackson.files.file_tree import results_in
 from robojackson.files.json_types import to_json
@@ -31,7 +32,7 @@ Figures = dict[str, Any]
 WALK, STANDING = "walk.mp4", "standing.parquet"
 ROBOT, PIPELINE = "humanoid", "base"
 """Names of the configurations that make a walker, besides that of its training."""
-CURVE_POINTS = 20
+CURVE_POINTS, DIGITS = 20, 8
 
 
 def pretrain(
@@ -72,7 +73,8 @@ def pretrain(
     else:
         evaluated = stages.evaluate(out / "policy.safetensors", motion, out, PIPELINE, {}, given)
     made = out / f"walker_{kind}.safetensors"
-    words = ["--kind", kind, *_command_options(overrides)]
+    words = ["--kind", kind, "-o", str(out), *_command_options(overrides)]
+    words += [] if reference is None else ["--reference", str(reference)]
     words += [] if robot is None else ["--robot", robot]
     facts = {
         "command": shlex.join(["robojackson", "pretrain", *words]),
@@ -153,21 +155,27 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
     """Return the motion that a walker is trained on: none for `paper`, the bundled walk for
     `track`."""
     from robojackson.rl.modes.standing_motion import make_standing_motion
+    from robojackson.robot.description import description_sha256
 
     if kind == "paper":
         with results_in(out) as files:
             files.write(STANDING, tables.encode(make_standing_motion(robot)))
         return out / STANDING
-    folder = out / Path(WALK).stem  # apart from the user's files in `out`
+    made_for = description_sha256(robot.description) + robot.sha256
+    digest = hashlib.sha256(made_for.encode()).hexdigest()[:DIGITS]
+    folder = out / f"{Path(WALK).stem}-{digest}"  # apart from the user's files in `out`
     made = folder / "reference.parquet"
     if not made.exists():
         stages.mocap(bundled(WALK), folder, PIPELINE, {})
-        stages.retarget(
-            folder / "smpl.parquet",
-            folder,
-            PIPELINE,
-            {"robot": robot.description.file or robot.description.name},
-        )
+        named = {"robot": robot.description.file or robot.description.name}
+        try:
+            stages.retarget(folder / "smpl.parquet", folder, PIPELINE, named)
+        except RejectedReference as cause:
+            made.unlink(missing_ok=True)
+            raise RejectedReference(
+                f"{robot.description.name} cannot follow the bundled walk: {cause.reason}",
+                "give a motion that it can follow: --reference REFERENCE",
+            ) from cause
     return made
 
 

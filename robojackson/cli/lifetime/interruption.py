@@ -8,6 +8,7 @@ import shlex
 import shutil
 import signal
 import sys
+from collections.abc import Mapping, Sequence
 from types import FrameType
 
 from robojackson.cli.lifetime.orphans import VARIABLE
@@ -99,19 +100,44 @@ def same_command() -> str:
     return shlex.join([program(), *sys.argv[1:]])
 
 
-def with_option(option: str, value: str, without: tuple[str, ...] = ()) -> str:
+def with_option(
+    option: str, value: str, without: tuple[str, ...] = (), unset: tuple[str, ...] = ()
+) -> str:
     """Return the command line of this process with another value of an option.
 
     Args:
         without: Options with a value that the line has no longer.
+        unset: Keys that no `--set` of the line gives any longer, since it would win.
     """
-    words = list(sys.argv[1:])
+    words = _without_settings(sys.argv[1:], unset)
     for name in (option, *without):
         for place, word in enumerate(words):
             if word == name or word.startswith(f"{name}="):
                 del words[place : place + (2 if word == name else 1)]
                 break
     return shlex.join([program(), *words, option, value])
+
+
+def with_settings(values: Mapping[str, str]) -> str:
+    """Return the command line of this process with other values of `--set`, by key."""
+    words = _without_settings(sys.argv[1:], tuple(values))
+    for key, value in values.items():
+        words += ["--set", f"{key}={value}"]
+    return shlex.join([program(), *words])
+
+
+def _without_settings(words: Sequence[str], keys: tuple[str, ...]) -> list[str]:
+    """Return the words without every `--set` of some keys."""
+    kept: list[str] = []
+    left = list(words)
+    while left:
+        size = 2 if left[0] == "--set" and len(left) > 1 else 1
+        pair = left[1] if size == 2 else left[0].removeprefix("--set=")
+        is_setting = size == 2 or left[0].startswith("--set=")
+        if not (is_setting and pair.partition("=")[0] in keys):
+            kept += left[:size]
+        del left[:size]
+    return kept
 
 
 def become_worker(supervisor: int, mark: str, last_line: int) -> None:

@@ -38,6 +38,8 @@ def view(
     rerun is a recording for Rerun (.rrd); gltf is dancer, reference and robot in motion (.glb).
     """
     if to is None:
+        if out is not None:
+            raise BadConfiguration(f"-o {out} needs --to: {', '.join(View)}")
         page = file / PAGE if file.is_dir() else file
         if not page.is_file():
             raise StoreError(f"{page}: no such file; the folder of a run has its {PAGE}")

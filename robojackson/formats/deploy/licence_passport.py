@@ -6,7 +6,7 @@ makes the whole unknown.
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, PackagePath
 from importlib.metadata import files as package_files
 from importlib.metadata import metadata as package_metadata
@@ -39,6 +39,8 @@ ALLOWS: Mapping[str, tuple[Answer, Answer, Answer, Answer]] = {
 }
 """Rights that a licence grants, in the order of `RIGHTS`; a licence that is not listed is
 unknown."""
+DECLARED, OF_CLIP = "declared by the user", "whose licence it has"
+"""Note of a licence that the user gave; end of the note of an input that has the clip's."""
 NOTHING_KNOWN: tuple[Answer, ...] = ("unknown", "unknown", "unknown", "unknown")
 KINDS = ("clip", "body models", "motion", "weights", "robot model", "tracker", "software")
 RUNNER_NEEDS: Mapping[str, str] = {
@@ -89,7 +91,8 @@ class Ingredient:
 def with_declared(
     ingredients: Iterable[Ingredient], declared: Mapping[str, str]
 ) -> list[Ingredient]:
-    """Return the ingredients with the licences that the user declared by kind.
+    """Return the ingredients with the licences that the user declared by kind; one that has the
+    clip's licence (`OF_CLIP`) has the declared one, too.
 
     Raises:
         BadConfiguration: no such kind.
@@ -99,10 +102,17 @@ def with_declared(
         if kind not in KINDS:
             raise BadConfiguration(f"--licence {kind}={licence}: kinds are {', '.join(KINDS)}")
         mine = [one for one in found if one.kind == kind and not one.is_known]
-        names = [one.name for one in mine] or [kind]
         found = [one for one in found if one not in mine]
-        found += [Ingredient(kind, name, licence, "declared by the user") for name in names]
+        if kind == "clip":
+            found = [replace(one, licence=licence) if _has_clips(one) else one for one in found]
+        found += [replace(one, licence=licence, note=DECLARED) for one in mine]
+        found += [] if mine else [Ingredient(kind, kind, licence, DECLARED)]
     return sorted(found, key=lambda one: KINDS.index(one.kind))
+
+
+def _has_clips(ingredient: Ingredient) -> bool:
+    """Return whether it has the licence of a clip whose licence is not known."""
+    return not ingredient.is_known and ingredient.note.endswith(OF_CLIP)
 
 
 def together(ingredients: Iterable[Ingredient]) -> dict[str, Answer]:

@@ -35,6 +35,9 @@ __all__ = [
     "TrainConfig",
 ]
 
+BUDGETS = ("steps", "minutes", "cpu_minutes")
+"""Keys of the budgets of a training."""
+
 
 @config_dataclass
 class TrainConfig:
@@ -61,7 +64,8 @@ class TrainConfig:
         curiosity: Which of the paper's three weights the curiosity bonus gets.
         checkpoint_seconds: Time between two checkpoints, s.
         progress_seconds: Time between two progress rows, s.
-        tensorboard: Whether to log for TensorBoard.
+        tensorboard: Whether to log for TensorBoard: in `tensorboard` beside the policy, or of a
+            pass or a study in `tensorboard/RUN` of the store. What is cached is not logged again.
     """
 
     mode: Literal["track", "paper"] = "track"
@@ -143,7 +147,7 @@ class TrainConfig:
     @property
     def has_budget(self) -> bool:
         """Return whether the training has a budget."""
-        return any(b is not None for b in (self.steps, self.minutes, self.cpu_minutes))
+        return any(getattr(self, name) is not None for name in BUDGETS)
 
     @property
     def environment(self) -> TrackConfig | PaperConfig:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from robojackson.cli.learning import walker_training
-from robojackson.errors import BadConfiguration
+from robojackson.errors import BadConfiguration, RejectedReference
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.pretrained import pretrained
@@ -65,7 +65,30 @@ def test_a_walker_of_track_does_not_take_what_lies_in_its_folder(
     monkeypatch.setattr("robojackson.cli.stages.retarget", a_stage)
     robot = load_robot(load(RobotDescription, "robots/humanoid"))
     found = walker_training._reference("track", tmp_path, robot)
-    assert (found, made) == (tmp_path / "walk" / "reference.parquet", [tmp_path / "walk"] * 2)
+    assert (found.name, made) == ("reference.parquet", [found.parent] * 2)
+    assert (found.parent.parent, found.parent.name[:5]) == (tmp_path, "walk-")
+    found.parent.mkdir()
+    found.write_bytes(b"the walk of this robot")
+    assert walker_training._reference("track", tmp_path, robot) == found
+    strong = load_robot(load(RobotDescription, "robots/humanoid_strong"))
+    other = walker_training._reference("track", tmp_path, strong)
+    assert other.parent != found.parent  # the same model with other motors
+
+
+def test_a_robot_that_cannot_walk_so_is_told_what_pretrain_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refusing(source: Path, out: Path, *rest: object) -> None:
+        out.mkdir(exist_ok=True)
+        (out / "reference.parquet").touch()
+        raise RejectedReference("too fast", "try a slower tempo", forcible=True)
+
+    monkeypatch.setattr("robojackson.cli.stages.mocap", lambda *rest: None)
+    monkeypatch.setattr("robojackson.cli.stages.retarget", refusing)
+    robot = load_robot(load(RobotDescription, "robots/humanoid"))
+    for _ in range(2):
+        with pytest.raises(RejectedReference, match=r"walk: too fast; .* --reference REFERENCE$"):
+            walker_training._reference("track", tmp_path, robot)
 
 
 @pytest.mark.parametrize("kind", ["track", "paper"])

@@ -144,3 +144,8 @@ def test_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     result = in_process("view", tmp_path, "--to", "gltf", "-o", tmp_path / "x.glb")
     assert (result.code != 0, "not the folder of a run" in result.err) == (True, True)
     assert "name it with -o FILE" in in_process("view", tmp_path, "--to", "gif").err
+
+
+def test_a_file_to_write_needs_a_format(tmp_path: Path) -> None:
+    done = in_process("view", str(tmp_path), "-o", str(tmp_path / "film.gif"))
+    assert "needs --to: gif, webp, rerun, gltf" in done.err

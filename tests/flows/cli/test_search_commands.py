@@ -24,6 +24,13 @@ def test_an_empty_catalogue_is_an_empty_list_for_programs(tmp_path: Path) -> Non
     assert text.answer == {"candidates": []}
 
 
+def test_a_dance_and_a_question_are_refused_together(tmp_path: Path) -> None:
+    words = ("catalogue", "--dance", "APT", "--sql", "SELECT 1 AS one")
+    text = in_process(*words, ROBOJACKSON_STORE=str(tmp_path / "store"))
+    assert (text.code, text.out) != (0, "1\n")
+    assert "--dance and --sql: give one" in text.err
+
+
 @pytest.mark.parametrize("command", ["catalogue", "metrics"])
 def test_a_question_without_an_answer_says_so_and_no_more(command: str, tmp_path: Path) -> None:
     sql = "SELECT 1 AS one WHERE false"

@@ -19,6 +19,7 @@ from robojackson.cli.importing import import_motion
 from robojackson.errors import BadConfiguration
 from robojackson.formats.deploy.licence_passport import (
     KINDS,
+    OF_CLIP,
     RIGHTS,
     RUNNER_NEEDS,
     Ingredient,
@@ -123,6 +124,17 @@ def test_a_licence_that_says_nothing_is_declared_by_the_user(said: str) -> None:
     assert not clip.is_known
     (declared,) = with_declared([clip], {"clip": "CC-BY-4.0"})
     assert (declared.name, declared.licence, declared.is_known) == ("a.mp4", "CC-BY-4.0", True)
+
+
+def test_a_declared_licence_keeps_the_digest_and_reaches_what_has_it_from_the_clip() -> None:
+    given = [
+        Ingredient("clip", "m.bvh", "unknown", "imported", "2d71"),
+        Ingredient("motion", "reference motion", "unknown", f"retargeted from m.bvh, {OF_CLIP}"),
+    ]
+    clip, motion = with_declared(given, {"clip": "CC-BY-4.0"})
+    assert (clip.licence, clip.sha256) == ("CC-BY-4.0", "2d71")
+    assert motion.licence == "CC-BY-4.0"
+    assert together([clip, motion])["sell"] == "notice"
 
 
 def test_several_licences_allow_what_the_strictest_does() -> None:
