@@ -84,8 +84,8 @@ def _markdown_row(row: Row) -> str:
     picture, url = web_address(row.get("thumbnail")), web_address(row.get("url"))
     title = in_markdown(_title(row))
     cells = (
-        f"![]({_in_link(picture)})" if picture else "",
-        f"[{title}]({_in_link(url)})" if url else title,
+        f"![]({in_link(picture)})" if picture else "",
+        f"[{title}]({in_link(url)})" if url else title,
         _form(row, *FIGURES["score"]),
         str(row["decision"]),
         in_markdown(clean_text(row.get("reason"), 200)),
@@ -93,7 +93,8 @@ def _markdown_row(row: Row) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _in_link(address: str) -> str:
+def in_link(address: str) -> str:
+    """Return an address that does not end a link or a cell of Markdown."""
     return address.replace("(", "%28").replace(")", "%29").replace("|", "%7C")
 
 

@@ -26,5 +26,8 @@ async def publish_search(
     await acreate_markdown_artifact(key=f"pictures-{slug}", markdown=text, description=caption)
     link = web_address(chosen["url"]) if chosen else ""
     if chosen and link:
-        title = clean_text(chosen["title"])
-        await acreate_link_artifact(key=f"chosen-{slug}", link=link, link_text=title)
+        await acreate_link_artifact(
+            key=f"chosen-{slug}",
+            link=ranking_table.in_link(link),
+            link_text=in_markdown(clean_text(chosen["title"])),
+        )

@@ -10,6 +10,7 @@ Kind = Literal[
     "found_twice",
     "known",
     "less_watched",
+    "further_down",
     "no_person",
     "person_missing",
     "body_cut_off",
@@ -52,6 +53,7 @@ _WORDS: Mapping[Kind, Callable[[Rejection], str]] = {
     "found_twice": lambda r: "found twice",
     "known": lambda r: "assessed before",
     "less_watched": lambda r: f"not among the {r.limit:g} most watched",
+    "further_down": lambda r: f"not among the first {r.limit:g}",
     "no_person": lambda r: f"no person found in {r.value:g} of {r.value:g} frames",
     "person_missing": lambda r: (
         f"a person in {r.value:.0%} of the frames, at least {r.limit:.0%} are needed"

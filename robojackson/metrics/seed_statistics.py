@@ -70,7 +70,8 @@ def estimate(samples: Sequence[float], rng: np.random.Generator) -> Estimate:
 
 
 def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Generator) -> Effect:
-    """Return how much better the treated are, pair by pair.
+    """Return how much better the treated are, pair by pair; one without a figure, or with one
+    beyond all measure, counts in the number of its kind alone.
 
     Raises:
         ValueError: the samples are not pairs.
@@ -78,13 +79,16 @@ def effect(treated: Sequence[float], control: Sequence[float], rng: np.random.Ge
     first, second = np.asarray(treated, float), np.asarray(control, float)
     if len(first) != len(second):
         raise ValueError(f"{len(first)} treated and {len(second)} control samples are no pairs")
-    p = np.nan
+    with np.errstate(invalid="ignore"):
+        differences = first - second
+    known = np.isfinite(differences)
+    first, second, p = first[known], second[known], np.nan
     if len(first) > 1:
         p = stats.permutation_test(
             (first - second,), np.mean, permutation_type="samples", n_resamples=_flips(len(first)),
             rng=rng,
         ).pvalue  # fmt: skip
-    difference = estimate(list(first - second), rng)
+    difference = estimate(list(differences), rng)
     smallest = max(2.0 ** (1 - len(first)), 2.0 / _flips(len(first))) if len(first) else np.nan
     return Effect(difference, float(p), smallest, probability_of_improvement(first, second))
 

@@ -57,6 +57,8 @@ class Feasible:
     @property
     def danced(self) -> Bool[np.ndarray, " S"]:
         """Steps that show the clip."""
+        if self.aims.cycle_offset is not None:  # a cycle is danced as a whole
+            return np.ones(len(self.steps), bool)
         first, past = self.clip.start, self.clip.stop
         result: np.ndarray = (self.steps > first - 0.5) & (self.steps < past - 0.5)
         return result

@@ -66,6 +66,10 @@ def start_file(start: str, mode: str, robot: RobotDescription | None = None) -> 
     path = Path(start)
     if path.is_file():
         return path
+    if path.is_dir():
+        raise BadPolicy(
+            f"start {start!r} is a folder; name policy.safetensors or networks.safetensors in it"
+        )
     if not HUB.match(start):
         raise BadPolicy(
             f"start {start!r}: no such file; use scratch, walker, dancer, a networks.safetensors, "
@@ -160,7 +164,7 @@ def _require_relu(path: Path, header: Mapping[str, object]) -> None:
     """Raise for other activations: SB3 writes the policy's arguments as text beside the pickle."""
     arguments = header.get("policy_kwargs")
     activation = str(arguments.get("activation_fn", "ReLU")) if isinstance(arguments, dict) else ""
-    if activation and "ReLU" not in activation:
+    if activation and not re.search(r"\bReLU\b", activation):
         raise BadPolicy(f"{path} has {activation} layers; only ReLU is supported")
 
 

@@ -38,13 +38,15 @@ def shipped_walker(mode: str) -> Path:
 
 
 def is_shipped(robot: RobotDescription, mode: str) -> bool:
-    """Return whether the shipped walker of a mode was trained on this robot or on its model.
+    """Return whether the shipped walker of a mode fits this robot: it was trained on it, or on its
+    model with all of its hinges.
 
     Raises:
         BadConfiguration: the model of the robot is not installed.
     """
     facts = load_networks(shipped_walker(mode)).facts
-    return facts.get("robot") == robot.name or facts.get("model_sha256") == _model(robot)
+    is_same = facts.get("model_sha256") == _model(robot) and not robot.fixed_joints
+    return facts.get("robot") == robot.name or is_same
 
 
 def shipped_dancer(robot: RobotDescription | None, mode: str) -> Path:

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.errors import BadConfiguration
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.names import matching, where
 
@@ -51,6 +52,7 @@ def actuation_of(
 
     Raises:
         UnknownName: a hinge or pattern that matches none.
+        BadConfiguration: a natural frequency of a hinge without armature.
     """
 
     def named(key: str) -> Float[np.ndarray, " J"]:
@@ -59,6 +61,11 @@ def actuation_of(
     limit = torque_limits(model, description, joints)
     armature = model.dof_armature[6:]
     turns, ratio = 2 * np.pi * named("natural_frequency"), named("damping_ratio")
+    for joint in np.flatnonzero((turns > 0) & (armature == 0) & np.isnan(named("stiffness"))):
+        raise BadConfiguration(
+            f"{where(description, 'natural_frequency')}: {joints[joint]} has no armature, so that "
+            "its gains would be zero; name its armature, or its stiffness and damping"
+        )
     ratio = np.where(np.isnan(ratio), DAMPING_RATIO, ratio)
     stiffness = _first(named("stiffness"), armature * turns**2, STIFFNESS_OF_LIMIT * limit)
     damping = _first(

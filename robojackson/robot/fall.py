@@ -51,13 +51,14 @@ class Fall:
     ) -> Bool[np.ndarray, " N"]:
         """Return which of N robots have fallen; `target` is the reference's state at the same
         step."""
+        tilt = min(self.tilt, np.pi)  # the cosine of a larger one would be a smaller one's
         if not self.relative:
             upright = up_axis(qpos[:, 3:7])[:, 2]
-            found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(self.tilt))
+            found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(tilt))
             return found
         along = alignment(qpos, target)
         off = np.abs(qpos[:, 2] - target[:, 2])
-        result: np.ndarray = (off > self.height) | (along < np.cos(self.tilt))
+        result: np.ndarray = (off > self.height) | (along < np.cos(tilt))
         return result
 
 

@@ -281,3 +281,17 @@ def test_a_repr_is_one_line(name: str, request: pytest.FixtureRequest) -> None:
 def test_what_is_no_argument_at_all_is_named(function: Callable[[Any], Any], what: str) -> None:
     with pytest.raises(TypeError, match=what):
         function(None)
+
+
+@pytest.mark.parametrize(
+    ("reward", "message"),
+    [
+        ({"joints": len}, "'joints' is the name of a configured term"),
+        ({"mine": 3}, "expected a function"),
+    ],
+)
+def test_a_reward_has_a_name_of_its_own_and_is_a_function(
+    reward: dict, message: str, reference: rj.ReferenceMotion, config: TrainConfig
+) -> None:
+    with pytest.raises(BadConfiguration, match=message):
+        rj.train_policy(reference, config=config, reward=reward)

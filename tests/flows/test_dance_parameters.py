@@ -96,7 +96,7 @@ def test_whole_sections_among_the_overrides_leave_a_dance_robust(
     ("own", "observation"),
     [
         ({"train.track.control.feedback": 0}, "full"),
-        ({"train.track.control.law": "torque"}, "full"),
+        ({"train.track.control.law": "hold"}, "full"),
         ({"train.track.control.root_state": "exact"}, "full"),
         ({"train.start": "walker"}, "full"),
         ({"train.track.observation": "preview"}, "preview"),

@@ -133,3 +133,13 @@ def test_a_start_from_many_motions_is_a_claim_where_it_was_trained() -> None:
 
 def test_a_setup_that_was_not_trained_is_not_measured() -> None:
     assert verdicts(scratch=0.1, pretrain=0.4)["Curiosity helps on dances"] == "not measured"
+
+
+@pytest.mark.parametrize("odd", [float("nan"), float("inf"), float("-inf")])
+def test_a_seed_without_a_figure_does_not_make_an_effect(odd: float) -> None:
+    treated, control = [0.71, 0.70, 0.69, 0.72, odd], [0.70, 0.72, 0.70, 0.71, 0.71]
+    found = seed_statistics.effect(treated, control, RNG(0))
+    without = seed_statistics.effect(treated[:-1], control[:-1], RNG(0))
+    assert (found.p, found.smallest_p) == (without.p, without.smallest_p)
+    assert found.improvement == without.improvement
+    assert found.p > 0.1

@@ -70,3 +70,16 @@ def test_a_walker_of_another_model_of_the_same_name_is_not_taken(
     heavier.write_text(mjcf_path(other).read_text().replace('mass="1"', 'mass="2"'))
     with pytest.raises(BadPolicy, match="has no walker yet"):
         walker_file(replace(other, mjcf=str(heavier)), "track")
+
+
+def test_a_robot_with_fewer_hinges_does_not_start_from_the_walker_of_all(
+    store_folder: Path,
+) -> None:
+    stiff = replace(describe_robot("humanoid"), name="stiff", fixed_joints={"abdomen_z": 0.0})
+    assert not is_shipped(stiff, "track")
+    assert is_shipped(replace(stiff, fixed_joints={}), "track")
+
+
+def test_a_start_that_is_a_folder_names_the_files_in_it(tmp_path: Path) -> None:
+    with pytest.raises(BadPolicy, match=r"is a folder; name policy\.safetensors or"):
+        pretrained(str(tmp_path), "track")

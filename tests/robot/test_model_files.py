@@ -69,3 +69,21 @@ def test_what_is_no_xml_is_named_as_such(tmp_path: Path, content: bytes) -> None
     (tmp_path / "a.xml").write_bytes(content)
     with pytest.raises(BadConfiguration, match=r"a\.xml: not XML, which MJCF and URDF are, from "):
         read_model(tmp_path / "a.xml")
+
+
+def test_every_file_that_a_mesh_may_be_read_from_belongs_to_the_model(tmp_path: Path) -> None:
+    """With `meshdir` MuJoCo does not read the one beside the model."""
+    (tmp_path / "meshes").mkdir()
+    for folder in (tmp_path, tmp_path / "meshes"):
+        (folder / "a.stl").write_text("")
+    inside = '<compiler meshdir="meshes"/><asset><mesh name="m" file="a.stl"/></asset>'
+    assert tmp_path / "meshes" / "a.stl" in files_of(mjcf(tmp_path, inside))
+
+
+@pytest.mark.parametrize("name", ["package://robot/meshes/a.stl", "a.stl"])
+def test_the_meshes_of_a_urdf_belong_to_it(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.stl").write_text("")
+    path = tmp_path / "robot.urdf"
+    mesh = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
+    path.write_text(f'<robot name="r"><link name="base">{mesh}</link></robot>')
+    assert files_of(path) == [path, tmp_path / "a.stl"]

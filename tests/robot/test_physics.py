@@ -305,3 +305,32 @@ def test_a_small_robot_falls_lower(robot: Robot) -> None:
     assert Fall.of(load_robot(free)).height == pytest.approx(
         min(0.7, 0.55 * standing_height(robot))
     )
+
+
+def test_a_natural_frequency_needs_an_armature() -> None:
+    """Its gains would be zero, and their ratio no number: MuJoCo would turn off every motor."""
+    with pytest.raises(BadConfiguration, match=r"_elbow has no armature.*name its armature"):
+        altered(
+            stiffness={}, damping={}, armature={"*": 0.02, "*_elbow": 0.0},
+            natural_frequency={"*_elbow": 10.0},
+        )  # fmt: skip
+
+
+def test_a_fall_rule_without_a_tilt_is_never_by_tilt() -> None:
+    robot = load_robot(HUMANOID)
+    leaning = default_standing_pose(robot)[None]
+    leaning[:, 3:7] = [np.cos(0.5), np.sin(0.5), 0.0, 0.0]
+    assert Fall(False, 0.1, 0.9).has_fallen(leaning, leaning).all()
+    assert not Fall(False, 0.1, 2 * np.pi).has_fallen(leaning, leaning).any()
+
+
+def test_a_body_touches_the_floor_below_the_clearance_and_no_higher() -> None:
+    robot = load_robot(HUMANOID)
+    detector = Detector(robot, 0.005, feet=False)
+    lying = default_standing_pose(robot)
+    lying[3:7] = [np.cos(np.pi / 4), 0.0, np.sin(np.pi / 4), 0.0]
+    heights = np.tile(lying, (400, 1))
+    heights[:, 2] = np.linspace(0.0, 0.4, 400)
+    found = detector.touches(heights)
+    assert found.floor.any()
+    assert found.distance.max() < 0.005

@@ -25,8 +25,8 @@ def page(query: str, address: str) -> str:
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """Return the video files that a page links to, on the same server; all of them, for any
-    words."""
+    """Return the video files that a page links to, on the same server; all of them, for any count
+    and words."""
     page = web_address(address or query)
     if not page:
         raise SearchFailed(f"server: {clean_text(address or query)} is no http address")
@@ -36,7 +36,7 @@ def search(
     files = dict.fromkeys(url for url in own if _is_video(url, page))
     if not files:
         raise SearchFailed(f"server: {clean_text(page)} lists no video")
-    return [_candidate(url, query if address else "", now) for url in list(files)[:count]]
+    return [_candidate(url, query if address else "", now) for url in files]
 
 
 def _page(address: str, config: WebConfig) -> str:

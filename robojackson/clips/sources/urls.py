@@ -20,8 +20,8 @@ log = logging.getLogger(__name__)
 def search(
     query: str, address: str, count: int, config: WebConfig, now: datetime
 ) -> list[VideoCandidate]:
-    """Return one candidate an address, unopened; what is no http address is left out with a
-    warning."""
+    """Return one candidate an address, unopened, for any count; what is no http address is left out
+    with a warning."""
     lines = _lines(address or query)
     found = [(line, web_address(line)) for line in lines]
     for line, url in found:
@@ -31,13 +31,15 @@ def search(
     made = [_candidate(url, named, now) for _, url in found if url]
     if not made:
         raise SearchFailed(f"urls: {clean_text(address or query)} holds no address")
-    return made[:count]
+    return made
 
 
 def _candidate(url: str, query: str, now: datetime) -> VideoCandidate:
-    last = url.split("?")[0].rstrip("/").rsplit("/", 1)[-1]
+    page, _, asked = url.partition("?")
+    last = page.rstrip("/").rsplit("/", 1)[-1]
     name = safe_name(last.rsplit(".", 1)[0], url)
-    return VideoCandidate(name, url, clean_text(last), query, GENERIC, retrieved_at=now)
+    title = f"{last}?{asked}" if asked and "." not in last else last  # watch?v=..., but clip.mp4
+    return VideoCandidate(name, url, clean_text(title), query, GENERIC, retrieved_at=now)
 
 
 def _lines(text: str) -> list[str]:

@@ -8,6 +8,7 @@ connects to is the proxy's matter.
 
 import ipaddress
 import socket
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -18,6 +19,7 @@ from robojackson.errors import DownloadFailed
 
 WITH_IPV4 = (ipaddress.IPv6Network("64:ff9b::/96"), ipaddress.IPv6Network("::/96"))
 """Networks whose addresses end with an IPv4 address: NAT64 (RFC 6052), and the earliest form."""
+PORTS = {"http": 80, "https": 443, "socks4": 1080, "socks5": 1080, "socks5h": 1080}
 ADVICE = "web.private_addresses=true in the configuration allows it"
 _trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted hosts of the guard", default=None)
 _resolve = socket.getaddrinfo
@@ -35,7 +37,8 @@ def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
 
     Args:
         allowed: Whether private addresses may be reached all the same.
-        proxy: Address of the user's own proxy, which may be anywhere.
+        proxy: Address of the user's own proxy, which may be anywhere; those of the environment
+            without it.
 
     Raises:
         DownloadFailed: an address was refused.
@@ -45,12 +48,25 @@ def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
         return
     if socket.getaddrinfo is not _guarded:
         socket.getaddrinfo = _guarded
-    host = urlsplit(proxy or "").hostname
-    token = _trusted.set(frozenset([host] if host else []))
+    token = _trusted.set(frozenset(_proxy_hosts(proxy)))
     try:
         yield
     finally:
         _trusted.reset(token)
+
+
+def _proxy_hosts(proxy: str | None) -> set[str]:
+    """Return the hosts of a proxy, or of those that the environment names."""
+    named = urllib.request.getproxies()
+    named.pop("no", None)
+    found = [host_and_port(each)[0] for each in ([proxy] if proxy else named.values())]
+    return set(filter(None, found))
+
+
+def host_and_port(address: str) -> tuple[str, int]:
+    """Return the host and port of an address; one without a scheme is a proxy's."""
+    parts = urlsplit(address if "://" in address else f"http://{address}")
+    return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)
 
 
 def is_public(address: str) -> bool:

@@ -16,7 +16,7 @@ class SelectionConfig:
 
     Attributes:
         max_duration_s: A video of this length or longer is dropped, seconds; a short has less.
-        top: How many of the most watched are kept.
+        top: How many of the most watched are kept, or of the first where no views are known.
         searched: How many results to request; most of them are dropped.
     """
 
@@ -69,8 +69,9 @@ def select(
         else:
             fit.append(candidate)
     ordered = sorted(fit, key=lambda c: (c.key in failed, -_views(c)))
-    less_watched = Rejection("less_watched", limit=config.top)
-    spare = [(c, less_watched) for c in ordered[config.top :]]
+    is_counted = any(candidate.view_count is not None for candidate in ordered)
+    left_out = Rejection("less_watched" if is_counted else "further_down", limit=config.top)
+    spare = [(c, left_out) for c in ordered[config.top :]]
     return Selection(tuple(ordered[: config.top]), (*dropped, *spare))
 
 

@@ -8,12 +8,12 @@ import threading
 import urllib.request
 from urllib.parse import urlsplit
 
+from robojackson.clips.web.address_guard import host_and_port
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.errors import SearchFailed
 
 PATIENCE_S = 5.0
 """For name resolution and connection together; a network that works takes well under one second."""
-PORTS = {"http": 80, "https": 443, "socks4": 1080, "socks5": 1080, "socks5h": 1080}
 ADVICE = (
     "check the network (behind a proxy: HTTPS_PROXY=http://HOST:PORT), or use videos "
     "of this machine: `robojackson find FOLDER --source folder`, `robojackson dance FILE`"
@@ -34,7 +34,7 @@ def require_reachable(page: str, proxy: str | None = None, patience_s: float = P
     through = proxy or _usual_proxy(page, host)
     reason = _refusal(through or page, patience_s)
     if reason:
-        via = f" through the proxy {_place(through)[0]}" if through else ""
+        via = f" through the proxy {host_and_port(through)[0]}" if through else ""
         raise SearchFailed(f"no connection to {clean_text(host)}{via} ({reason}): {ADVICE}")
 
 
@@ -62,14 +62,8 @@ def _refusal(address: str, patience_s: float) -> str:
 
 def _attempt(address: str, patience_s: float) -> str:
     try:
-        socket.create_connection(_place(address), patience_s).close()
+        socket.create_connection(host_and_port(address), patience_s).close()
     except (OSError, ValueError) as cause:
         detail = cause.strerror if isinstance(cause, OSError) and cause.strerror else str(cause)
         return clean_text(detail or type(cause).__name__)
     return ""
-
-
-def _place(address: str) -> tuple[str, int]:
-    """Return the host and port of an address; one without a scheme is a proxy's."""
-    parts = urlsplit(address if "://" in address else f"http://{address}")
-    return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)

@@ -68,7 +68,7 @@ def from_info(
         return None
     source = safe_name(str(info.get("ie_key") or info.get("extractor_key") or GENERIC).lower())
     return VideoCandidate(
-        video_id=safe_name(info.get("id"), url if source == GENERIC else ""),
+        video_id=safe_name(info.get("id"), url if source == GENERIC or not info.get("id") else ""),
         url=url,
         title=clean_text(info.get("title")),
         query=clean_text(query),

@@ -129,9 +129,12 @@ def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | N
 
 
 def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the videos of a listing; a page of one video is a listing of one."""
+    """Return the videos of a listing and of the listings in it, such as the tabs of a channel; a
+    page of one video is a listing of one."""
     found = info.get("entries")
-    return [info] if found is None else [entry for entry in found if entry]
+    if found is None:
+        return [info]
+    return [video for entry in found if entry for video in entries(entry)]
 
 
 def _options(config: WebConfig) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class GalleryRun:
         return quantities(found)
 
     @property
-    def order(self) -> dict[str, float]:
+    def order(self) -> dict[str, float | str]:
         """Return the sort keys."""
         found = {key: _number(self.summary.get(key)) for key in ORDERED}
         return {"finished": self.finished_at.timestamp(), **found}
@@ -71,5 +71,6 @@ def render_gallery(runs: Sequence[GalleryRun]) -> str:
     )
 
 
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else 0.0
+def _number(value: object) -> float | str:
+    """Return a sort key; empty where there is no figure, which comes last."""
+    return float(value) if isinstance(value, int | float) and value == value else ""

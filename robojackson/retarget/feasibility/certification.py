@@ -55,6 +55,7 @@ def certify(
     found = contact_wrench.supply(needs)
     slack = tempo.slower_slacks(needs, forces, found.slack)
     free = _without_limits(needs, found)
+    free = replace(free, torque=_motor_torque(needs, free))  # a stop carries the rest
     failures = [
         _failure(robot, step, found, free, near, slack, tolerance)
         for step in range(len(qpos))

@@ -68,7 +68,7 @@ class Detector:
     """
 
     def __init__(self, robot: Robot, clearance: float, feet: bool = True) -> None:
-        self.model = _models(robot).with_margin(clearance, feet)
+        self.model, self._clearance = _models(robot).with_margin(clearance, feet), clearance
         self.data = mujoco.MjData(self.model)
 
     def touches(self, qpos: Float[np.ndarray, "N nq"]) -> Touches:
@@ -102,11 +102,12 @@ class Detector:
         mujoco.mj_collision(self.model, data)
         if data.ncon:
             contact = data.contact
-            found.frames.append(np.full(data.ncon, index))
-            found.distance.append(contact.dist.copy())
-            found.position.append(contact.pos.copy())
-            found.normal.append(contact.frame[:, :3].copy())
-            found.geoms.append(contact.geom.copy())
+            near = contact.dist < self._clearance  # the margins of two geoms may add up
+            found.frames.append(np.full(near.sum(), index))
+            found.distance.append(contact.dist[near])
+            found.position.append(contact.pos[near])
+            found.normal.append(contact.frame[near, :3])
+            found.geoms.append(contact.geom[near])
 
 
 @dataclass(frozen=True)

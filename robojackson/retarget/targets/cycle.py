@@ -216,7 +216,8 @@ def _closed_clip(
 def close(
     points: Float[np.ndarray, "N 29 3"], in_place_m: float
 ) -> tuple[Float[np.ndarray, "N 29 3"], Float[np.ndarray, "3"]]:
-    """Make the last pose the first one, moved along the floor; what is left over goes evenly.
+    """Make the last pose the first one, moved along the floor; what is left over goes evenly. The
+    path turns with the body, so that feet that stand still do so on an arc, too.
 
     Returns the closed points and the displacement of the cycle, zero when it is under `in_place_m`.
     """
@@ -225,6 +226,8 @@ def close(
     turn = wrapped(yaw[-1] - yaw[0])
     limbs = _turned(points - ground[:, None], -turn * share)
     limbs -= (share - 0.5)[:, None, None] * (limbs[-1] - limbs[0])
+    steps = _turned(np.diff(ground, axis=0)[:, None], -turn * (share[1:] + share[:-1]) / 2)[:, 0]
+    ground = ground[0] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     travel = ground[-1] - ground[0]
     if np.linalg.norm(travel) < in_place_m:
         ground = ground - share[:, None] * travel

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from robojackson.config import config_dataclass
 from robojackson.errors import ConflictingValues
@@ -54,12 +54,22 @@ PRESETS: dict[str, dict[str, Any]] = {
 dances without a policy already (`track.control.feedback_path: sampled`)."""
 
 
+def _require_positive(entropy: str) -> str:
+    """Return an entropy coefficient that begins above zero."""
+    begin = entropy.removeprefix("auto").removeprefix("_")
+    if begin and float(begin) == 0:
+        raise ValueError(f"{entropy} begins at zero and stays there; take auto or auto_0.02")
+    return entropy
+
+
 NORM_EPSILON = 1e-6
 """Epsilon of layer normalisation: flax's."""
 
 Layers = Annotated[
     tuple[Annotated[int, Field(ge=1, le=4096)], ...], Field(min_length=1, max_length=16)
 ]
+
+Entropy = Annotated[str, Field(pattern=r"^auto(_\d*\.?\d+)?$"), AfterValidator(_require_positive)]
 
 
 @config_dataclass
@@ -115,7 +125,7 @@ class TqcConfig:
     critics: Literal[2] = 2
     quantiles: int = Field(default=25, ge=1, le=1_000)
     top_quantiles_to_drop: int = Field(default=2, ge=0)
-    entropy: str = Field(default="auto_0.02", pattern=r"^auto(_\d*\.?\d+)?$")
+    entropy: Entropy = "auto_0.02"
     actor: Layers = (256, 256)
     critic: Layers = (256, 256)
     layer_norm: bool = True

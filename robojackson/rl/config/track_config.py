@@ -19,7 +19,8 @@ class ControlConfig:
 
     Attributes:
         law: `pd`: a PD law evaluated once a substep. `hold`: the same evaluated once a control
-            step, its torque held, as a plain `env.step` does. `torque`: the action is the torque.
+            step, its torque held, as a plain `env.step` does. `torque`: the action is the torque
+            (mode `paper` alone).
         substeps: Physics substeps a control step; the robot's when null.
         stiffness: Proportional gain, multiples of the torque limit, 1/rad; the robot's own gains
             when null.
@@ -238,11 +239,10 @@ class TrackConfig:
     threads: int = Field(default=2, ge=1)
 
     @model_validator(mode="after")
-    def _seen_differences(self) -> "TrackConfig":
+    def _goes_together(self) -> "TrackConfig":
+        if self.control.law == "torque":
+            raise ConflictingValues("law torque is of mode paper; pd and hold are", "control.law")
         if self.differences and self.observation != "onboard":
-            raise ConflictingValues(
-                "differences is for observation onboard; the others have more of the reference",
-                "differences",
-                "observation",
-            )
+            reason = "differences is for observation onboard; the others have more of the reference"
+            raise ConflictingValues(reason, "differences", "observation")
         return self

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.motion.floor_move import FloorMove
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.config.train_config import (
@@ -95,6 +96,7 @@ def evaluate_policy(
     require_same_clock(control_step(robot, control), reference.dt)
     environment = environment_of(policy, control)
     _warn_about_other_motion(policy, reference)
+    given = reference
     reference = facing_ahead(reference) if isinstance(environment, PaperConfig) else reference
     clip = driven_clip(robot, reference, control, sees_ahead(policy), progress)
     _warn_about_other_path(policy, reference, clip)
@@ -130,6 +132,8 @@ def evaluate_policy(
     if verdict.kind == "too_short":
         shown = without_short_figures(own)
         baselines = {name: without_short_figures(found) for name, found in summaries.items()}
+    if reference is not given:
+        qpos = FloorMove.onto(reference.qpos[:1], given.qpos[:1]).qpos(qpos)
     facts: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
     facts |= _who(policy)
     if config.passport:

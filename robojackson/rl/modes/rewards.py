@@ -159,6 +159,23 @@ class RewardState:
     action_change: Float[np.ndarray, " N"]
 
 
+def require_names_of_their_own(functions: Mapping[str, RewardFunction]) -> None:
+    """Raise for a user's term that would replace a configured one.
+
+    Raises:
+        BadConfiguration: its name is taken, or it is no function.
+    """
+    taken = {*RewardConfig.terms(), "action_rate", "curiosity"}
+    for name, function in functions.items():
+        if name in taken:
+            raise BadConfiguration(
+                f"reward {name!r} is the name of a configured term, beside which yours is paid: "
+                "give it another"
+            )
+        if not callable(function):
+            raise BadConfiguration(f"reward {name!r} is {function!r}; expected a function")
+
+
 def own_terms(
     functions: Mapping[str, RewardFunction], state: RewardState
 ) -> dict[str, Float[np.ndarray, " N"]]:

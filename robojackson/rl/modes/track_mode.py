@@ -34,6 +34,7 @@ from robojackson.rl.modes.rewards import (
     TrackingErrors,
     is_off_track,
     own_terms,
+    require_names_of_their_own,
     reward_terms,
     tracked_points,
     tracking_errors,
@@ -65,6 +66,7 @@ class TrackMode:
         seed: int,
         rewards: Mapping[str, RewardFunction] = MappingProxyType({}),
     ) -> None:
+        require_names_of_their_own(rewards)
         self._config, self._rewards = config, rewards
         ahead, control = config.observation in AHEAD, control_of(config)
         self.clip = driven_clip(robot, reference, control, ahead)

@@ -43,9 +43,10 @@ BAD_STATE = [
         mujoco.mjtWarning.mjWARN_BADQPOS,
         mujoco.mjtWarning.mjWARN_BADQVEL,
         mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_BADCTRL,
     )
 ]
-"""Warnings at which MuJoCo itself resets a state."""
+"""Warnings at which MuJoCo itself resets a state, or turns off all motors."""
 
 
 def resolved(

@@ -47,6 +47,20 @@ def test_the_guard_ends_and_lets_a_proxy_be() -> None:
     assert socket.getaddrinfo("127.0.0.1", 9)
 
 
+@pytest.mark.parametrize("named", ["http://127.0.0.1:3128", "127.0.0.1:3128"])
+def test_a_proxy_of_the_environment_may_be_anywhere(
+    named: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HTTPS_PROXY", named)
+    monkeypatch.setenv("NO_PROXY", "localhost")
+    with public_only(allowed=False):
+        assert socket.getaddrinfo("127.0.0.1", 3128)
+        with pytest.raises(PrivateAddress):
+            socket.getaddrinfo("localhost", 3128)
+    with public_only(allowed=False, proxy="8.8.8.8:3128"), pytest.raises(PrivateAddress):
+        socket.getaddrinfo("127.0.0.1", 3128)
+
+
 def test_a_private_page_is_not_requested(web: Web) -> None:
     with pytest.raises(DownloadFailed, match=r"web\.private_addresses=true"):
         offer(f"{web.url}/moved/clip.mp4", "score", FormatConfig(), STRICT)

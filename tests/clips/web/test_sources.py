@@ -64,6 +64,13 @@ def test_addresses_may_be_given_in_a_line() -> None:
     assert [candidate.title for candidate in found] == ["a.mp4", "b.mp4"]
 
 
+def test_a_list_is_read_to_its_end_and_its_rows_can_be_told_apart() -> None:
+    lines = " ".join(f"https://www.youtube.com/watch?v=AAAAAAAAA{number}" for number in range(60))
+    found = source("urls").search(lines, "", 40, WEB, NOW)
+    assert len({candidate.key for candidate in found}) == 60
+    assert found[7].title == "watch?v=AAAAAAAAA7"
+
+
 def test_a_list_without_addresses_is_a_failed_search(tmp_path: Path) -> None:
     (tmp_path / "urls.txt").write_text("nothing\n")
     with pytest.raises(SearchFailed, match="holds no address"):

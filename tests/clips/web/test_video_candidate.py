@@ -8,6 +8,7 @@ import pytest
 from robojackson.clips.sources.site import candidates
 from robojackson.clips.web.candidate_selection import SelectionConfig, select
 from robojackson.clips.web.video_candidate import VideoCandidate, from_info
+from robojackson.clips.web.yt_dlp_client import entries
 
 NOW = datetime(2026, 11, 21, tzinfo=UTC)
 
@@ -149,6 +150,27 @@ def test_ties_keep_the_order_of_the_search() -> None:
         "v2",
         "v3",
     ]
+
+
+def test_entries_without_an_id_are_as_many_videos_as_addresses() -> None:
+    entries = [flat(id=None, url=f"https://site/watch/{number}") for number in range(3)]
+    found = [from_info(entry, "apt", NOW) for entry in entries]
+    assert len({candidate.key for candidate in found if candidate}) == 3
+
+
+def test_the_tabs_of_a_channel_are_its_videos() -> None:
+    tabs = [search(flat("AAAAAAAAAAA"), flat("BBBBBBBBBBB")), search(flat("CCCCCCCCCCC"))]
+    found = [entry["id"] for entry in entries(search(*tabs))]
+    assert found == ["AAAAAAAAAAA", "BBBBBBBBBBB", "CCCCCCCCCCC"]
+
+
+@pytest.mark.parametrize(
+    ("views", "reason"), [(None, "not among the first 1"), (3, "not among the 1 most watched")]
+)
+def test_what_is_left_out_is_reported_by_what_is_known(views: int | None, reason: str) -> None:
+    found = [from_info(flat(name, view_count=views), "apt", NOW) for name in ("a" * 11, "b" * 11)]
+    ((_, rejection),) = select([one for one in found if one], (), SelectionConfig(top=1)).dropped
+    assert str(rejection) == reason
 
 
 def test_videos_that_failed_before_take_the_places_that_are_left() -> None:

@@ -148,7 +148,7 @@ def test_the_tempo_is_that_of_the_dance_without_its_tails(rate: float) -> None:
     """70 steps before it, 180 of the dance, 200 after it."""
     dance = np.arange(69.5 + rate / 2, 249.5, rate)
     steps = np.concatenate([np.arange(70.0), dance, np.arange(250.0, 450.0)])
-    aims = SimpleNamespace(keypoints_w=np.zeros((len(steps), 14, 3)), dt=0.02)
+    aims = SimpleNamespace(keypoints_w=np.zeros((len(steps), 14, 3)), dt=0.02, cycle_offset=None)
     able = Feasible(np.zeros((len(steps), 7)), cast(Any, aims), steps, slice(70, 250))
     robot = SimpleNamespace(keypoint_weights=np.ones(14))
     found = retargeting._slowing(able, cast(Any, aims), cast(Any, robot))
@@ -156,3 +156,10 @@ def test_the_tempo_is_that_of_the_dance_without_its_tails(rate: float) -> None:
     assert found["tempo_min"] == pytest.approx(rate, abs=0.01)
     tails = retargeting._tail_seconds(able.danced, 0.02)
     assert tails == pytest.approx({"lead_s": 1.4, "tail_s": 4.0}, abs=0.021)
+
+
+def test_a_cycle_that_is_slowed_as_a_whole_has_no_tail() -> None:
+    steps = warp(np.full(100, 0.3), ring=True)
+    aims = SimpleNamespace(cycle_offset=np.zeros(3))
+    able = Feasible(np.zeros((len(steps), 7)), cast(Any, aims), steps, slice(0, 100))
+    assert able.danced.all()

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robojackson.body.skeleton import KEYPOINT_NAMES
+from robojackson.body.skeleton import KEYPOINT_NAMES, REST_JOINTS
 from robojackson.errors import TrackTooShort
+from robojackson.geometry.frames import SMPL_TO_WORLD
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.targets.cycle import CycleConfig, close, find_cycle, heading, human_clip
 from tests.fixtures.robots import human
@@ -135,3 +136,22 @@ def test_tempo_stretches_the_robots_clock():
 def test_too_short_a_clip_is_refused():
     with pytest.raises(TrackTooShort, match="too short to retarget"):
         human_clip(_swaying(3, 30), 0.015, "auto", 1.0, CONFIG)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 18.0, 60.0])
+def test_a_foot_that_stands_on_an_arc_stands_in_the_closed_cycle(degrees: float) -> None:
+    """The heading is closed by turning the body back; its path turns with it."""
+    fps, frames, ankle = 50.0, 101, KEYPOINT_NAMES.index("left_ankle")
+    rest = (REST_JOINTS - REST_JOINTS[0]) @ SMPL_TO_WORLD.T
+    angle = np.radians(degrees) * np.linspace(0.0, 1.0, frames)
+    turns = Rotation.from_euler("z", angle[:, None]).as_matrix()
+    between = turns[:-1] @ Rotation.from_euler("z", angle[1] / 2).as_matrix()
+    path = np.cumsum([[0.0, 0.0, 0.9], *(between @ [1.2 / fps, 0.0, 0.0])], axis=0)
+    points = path[:, None] + np.einsum("nij,kj->nki", turns, rest)
+    points[80:, ankle] = points[90, ankle]  # it stands as the body passes over it
+    back = turns[-1].T @ (points[-1, ankle] - path[-1])
+    points[:21, ankle] = path[:21] + back  # and is where it was as the cycle begins: no seam
+    closed, travel = close(points, 0.3)
+    speed = np.linalg.norm(np.diff(closed[80:, ankle, :2], axis=0), axis=1) * fps
+    assert speed.max() < 0.18 * degrees / 60 + 0.01  # .41 and 1.28 m/s with a path that stays
+    assert np.degrees(np.arctan2(travel[1], travel[0])) == pytest.approx(0.0, abs=0.1)

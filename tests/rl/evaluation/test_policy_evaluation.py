@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadPolicy, RejectedReference, TrackTooShort
+from robojackson.geometry.rotations import heading, wrapped
+from robojackson.motion.floor_move import FloorMove
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import (
     ControlConfig,
@@ -364,3 +366,22 @@ def test_a_policy_of_paper_mode_is_evaluated_on_348_observations(
     summary = evaluate_policy(Policy((nothing,), facts), sway, robot, brief).summary
     assert summary["variants"] == {}
     assert set(summary["reward"]["audit"]) == {"root", "world"}  # type: ignore[index]
+
+
+def test_a_rollout_of_paper_mode_lies_where_the_given_reference_does(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """The paper evaluates the motion turned ahead; pages show it beside the motion as it is."""
+    away = FloorMove(np.array([1.2]), np.array([[0.7, -0.4]]))
+    turned = dataclasses.replace(
+        sway, qpos=away.qpos(np.array(sway.qpos)), qvel=away.qvel(np.array(sway.qvel)),
+        keypoints_w=away.points(np.array(sway.keypoints_w)),
+    )  # fmt: skip
+    control = dataclasses.asdict(ControlConfig(law="torque"))
+    weights = (np.zeros((348, robot.model.nu)), np.zeros(robot.model.nu))
+    policy = Policy((weights,), {"robot": "humanoid", "mode": "paper", "control": control})
+    found = evaluate_policy(policy, turned, robot, EvaluateConfig(phases=2, resets=1))
+    off = np.linalg.norm(found.rollout_qpos[0, :2] - turned.qpos[0, :2])
+    assert off < 0.02  # the noise of the start
+    ahead = wrapped(heading(found.rollout_qpos[:1, 3:7]) - heading(turned.qpos[:1, 3:7]))
+    assert abs(float(ahead[0])) < 0.02
