@@ -150,7 +150,7 @@ def render_video(
     out: FilePath,
     reference: FilePath | ReferenceMotion,
     *,
-    rollout: PolicyEvaluation | Rollout | Float[np.ndarray, "S nq"] | None = None,
+    rollout: FilePath | PolicyEvaluation | Rollout | Float[np.ndarray, "S nq"] | None = None,
     motion: FilePath | SmplSequence | None = None,
     video: FilePath | None = None,
     landmarks: FilePath | LandmarkTrack | None = None,
@@ -165,7 +165,8 @@ def render_video(
     Args:
         out: The file.
         reference: The robot's motion.
-        rollout: The trained robot: an evaluation, its rollout, or qpos (S, nq) a control step.
+        rollout: The trained robot: an evaluation, its rollout or the file of that, or qpos (S, nq)
+            a control step.
         motion: The person, as a skeleton.
         video: The source; with `landmarks`.
         landmarks: What was detected in it.
@@ -188,7 +189,13 @@ def render_video(
     target = read_if_path(ReferenceMotion, reference)
     machine = robot_of(target) if robot is None else require_robot(target, load_robot(robot))
     danced = rollout.rollout if isinstance(rollout, PolicyEvaluation) else rollout
+    danced = read_if_path(Rollout, danced) if isinstance(danced, str | PathLike) else danced
     qpos = danced.qpos if isinstance(danced, Rollout) else danced
+    if qpos is not None and np.shape(qpos)[1:] != (machine.model.nq,):
+        raise BadConfiguration(
+            f"the rollout has states of shape {np.shape(qpos)}; {machine.description.name} needs "
+            f"(steps, {machine.model.nq})"
+        )
     track = None if landmarks is None else read_if_path(LandmarkTrack, landmarks)
     person = None if motion is None else read_if_path(SmplSequence, motion)
     source = None if video is None else Path(video)

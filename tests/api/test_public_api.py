@@ -14,6 +14,7 @@ import pytest
 import robojackson as rj
 from robojackson.clips.video import read_frames
 from robojackson.errors import BadConfiguration, BadTable, RejectedReference, StoreError
+from robojackson.motion.rollout import Rollout
 from robojackson.pipeline.bundled_clips import bundled
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.config.train_config import TrainConfig
@@ -295,3 +296,17 @@ def test_a_reward_has_a_name_of_its_own_and_is_a_function(
 ) -> None:
     with pytest.raises(BadConfiguration, match=message):
         rj.train_policy(reference, config=config, reward=reward)
+
+
+def test_a_rollout_of_another_robot_is_refused_before_anything_is_drawn(
+    tmp_path: Path, reference: rj.ReferenceMotion
+) -> None:
+    path = Rollout(reference.dt, np.zeros((5, 30))).save(tmp_path / "rollout.parquet")
+    with pytest.raises(BadConfiguration, match=r"shape \(5, 30\); humanoid needs \(steps, 24\)"):
+        rj.render_video(tmp_path / "film.mp4", reference, rollout=path)
+
+
+def test_our_own_tables_take_no_frame_rate(tmp_path: Path, reference: rj.ReferenceMotion) -> None:
+    path = reference.save(tmp_path / "reference.parquet")
+    with pytest.raises(BadConfiguration, match="have their own fps and axes"):
+        rj.read_motion(path, fps=12)
