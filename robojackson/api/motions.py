@@ -186,9 +186,7 @@ def read_motion(
     path = path_of(file, "the motion")
     if path.suffix == TABLE:
         if fps is not None or up is not None:
-            raise BadConfiguration(
-                f"{path}: our tables have their own fps and axes; drop both"
-            )
+            raise BadConfiguration(f"{path}: our tables have their own fps and axes; drop both")
         return SmplSequence.load(path) if holds_a_person(path) else ReferenceMotion.load(path)
     return read_foreign(path, fps, up, config or MocapConfig()).motion
 

@@ -65,6 +65,7 @@ def unsupported(
     dt: float,
     reach_m: float = 0.01,
     fall: float = 0.4,
+    ring: bool = False,
 ) -> Bool[np.ndarray, " S"]:
     """Return the steps in which no sole is near the floor and yet the body does not fall.
 
@@ -76,6 +77,9 @@ def unsupported(
         dt: Seconds a step.
         reach_m: A sole below this can carry, metres.
         fall: Share of gravity from which the body counts as falling.
+        ring: Whether the first step follows the last.
     """
-    falling = -np.gradient(np.gradient(com_height, dt), dt) > fall * 9.81
+    height = np.concatenate([com_height[-2:], com_height, com_height[:2]]) if ring else com_height
+    falling = -np.gradient(np.gradient(height, dt), dt) > fall * 9.81
+    falling = falling[2:-2] if ring else falling
     return np.asarray((sole_height > reach_m).all(axis=1) & ~falling)

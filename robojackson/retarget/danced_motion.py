@@ -118,7 +118,7 @@ def _solved(
     tailed = with_tails(plain, robot, config.tails)
     upright = aims = tailed.aims
     found, floor_mm = optimise(aims, robot, config)
-    hovering = hovers(robot, found.qpos, aims.dt)
+    hovering = hovers(robot, found.qpos, aims.dt, aims.cycle_offset is not None)
     if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
         _log.info("removed a flight that does not fall: solving again")
         grounded = targets(clip, robot, hovering[tailed.clip], hops)

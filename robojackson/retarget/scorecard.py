@@ -57,11 +57,18 @@ def score(
     return card
 
 
-def hovers(robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float) -> Bool[np.ndarray, " S"]:
-    """Return the steps in which the robot neither stands nor falls."""
+def hovers(
+    robot: Robot, qpos: Float[np.ndarray, "S nq"], dt: float, ring: bool
+) -> Bool[np.ndarray, " S"]:
+    """Return the steps in which the robot neither stands nor falls.
+
+    Args:
+        ring: Whether the first step follows the last.
+    """
     posed = pose(tree(robot), qpos)
     soles = posed.ball_pos[..., 2] - robot.contact_radii
-    return retarget_error.unsupported(soles, centre_of_mass(tree(robot), posed)[:, 2], dt)
+    height = centre_of_mass(tree(robot), posed)[:, 2]
+    return retarget_error.unsupported(soles, height, dt, ring=ring)
 
 
 def _feasibility(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
@@ -123,7 +130,7 @@ def _contact(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str, 
         "planted_gap_max_mm": float(1e3 * height[aims.contact == PLANTED].max(initial=0.0)),
         "contact_share": float((aims.contact != AIR).any(axis=1).mean()),
         "planted_share": float((aims.contact == PLANTED).any(axis=1).mean()),
-        "unsupported_share": float(hovers(robot, motion.qpos, motion.dt).mean()),
+        "unsupported_share": float(hovers(robot, motion.qpos, motion.dt, motion.cyclic).mean()),
     }
 
 

@@ -49,6 +49,19 @@ def test_slip_of_a_cycle_counts_the_step_over_the_seam():
     np.testing.assert_allclose(retarget_error.slip_cm_s(velocity, planted), [50.0])
 
 
+@pytest.mark.parametrize("roll", [0, 15, 30, 45])
+def test_a_flight_across_the_seam_of_a_cycle_is_one_as_any_other(roll: int):
+    """A body in the air for 14 steps of 60, wherever the cycle begins."""
+    dt, step = 0.02, np.arange(60)
+    height = 1.0 + np.where(step < 14, 4.0 * (step + 0.5) * (13.5 - step) * dt**2, 0.0)
+    soles = np.where(step < 14, 0.2, 0.0)[:, None]
+    found = retarget_error.unsupported(
+        np.roll(soles, roll, 0), np.roll(height, roll), dt, ring=True
+    )
+    inside = retarget_error.unsupported(np.roll(soles, 20, 0), np.roll(height, 20), dt)
+    np.testing.assert_array_equal(np.roll(found, 20 - roll), inside)
+
+
 def test_a_levitating_body_is_unsupported_and_a_falling_one_is_not():
     soles = np.full((40, 2), 0.3)
     assert retarget_error.unsupported(soles, np.full(40, 1.0), DT).all()
