@@ -200,7 +200,6 @@ def test_a_calm_rehearsal_has_no_noise_and_no_pushes() -> None:
     robots = rehearsal()
     robots.calm(robots.motions.first[MOTION] + 10)
     robots._push_at.zero_()
-    robots._push_some()
     before = robots.robots.qvel.clone()
     robots._push_some()
     np.testing.assert_array_equal(robots.robots.qvel, before)

@@ -37,8 +37,7 @@ LIMBS = {
     "left_foot": ("left_hip", "left_ankle"),
     "right_foot": ("right_hip", "right_ankle"),
 }
-"""The ends of each limb by its keypoint of robots: the dancer's, which the robot's follow
-(`retarget.targets.keypoint_targets`)."""
+"""The ends of each limb by its keypoint of robots: the dancer's, which the robot's follow."""
 
 
 @dataclass(frozen=True)
@@ -124,8 +123,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
 
 
 def limb_rows(results: Results) -> list[Verdict]:
-    """Return figures of head, hands and feet: capture, retargeting, the rollout shown, the
-    evaluation."""
+    """Return figures of head, hands and feet from all stages, and of the rollout shown."""
     errors = results.player.error_while_up if results.player else {}
     directions = limb_directions(results.sequence, results.reference)
     rows = []
@@ -202,8 +200,8 @@ def _plots(results: Results) -> list[Plot]:
         dancer = dancer_of(results.evaluation)
         figure = run_plots.survival_by_phase(results.evaluations, reference.dt, dancer)
         caption = (
-            "Mean survival from every start phase: a bar far below the mark where its rollouts "
-            "end is a moment at which it cannot begin."
+            "Mean survival from every start phase: where a bar is far below the end of its "
+            "rollouts, the robot cannot begin."
         )
         made.append(_plot("Survival by start phase", caption, figure))
     if any(key.startswith("limb_gain_") for key in results.evaluation):

@@ -102,10 +102,8 @@ def evaluate_policy(
     _warn_about_other_path(policy, reference, clip)
     starts, labels = starts_of(robot, clip, config)
     horizon = clip.horizon(starts.step, config.seconds)
-    scorer, meter = (
-        RolloutScorer(robot, reference, config),
-        RewardMeter(robot, reference, clip, environment),
-    )
+    scorer = RolloutScorer(robot, reference, config)
+    meter = RewardMeter(robot, reference, clip, environment)
     fall = Fall.of(robot)
     rows: list[dict[str, object]] = []
     summaries: dict[str, dict[str, float]] = {}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.rl.config.train_config import RandomConfig, TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
@@ -16,7 +17,8 @@ from robojackson.rl.policy import load_policy
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import train_policy
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
+from tests.fixtures.robots import G1
 
 SMALL = TqcConfig(n_envs=4, warmup=8, batch=8, buffer=1000, actor=(12, 8), critic=(10,))
 ONBOARD = TrackConfig(observation="onboard")
@@ -28,10 +30,13 @@ def moved(sway: ReferenceMotion) -> tuple[np.ndarray, ...]:
 
 
 def test_it_has_five_numbers_a_hinge_and_nine(robot: Robot) -> None:
-    """Of 29 hinges: the 154 of mjlab's tracking task without state estimation."""
-    observer = Observer(robot, "onboard")
-    assert observer.actor_size == 9 + 5 * len(robot.joint_names)
-    assert 9 + 5 * 29 == 154
+    assert Observer(robot, "onboard").actor_size == 9 + 5 * len(robot.joint_names)
+
+
+@G1
+def test_the_g1_observes_as_many_numbers_as_mjlabs() -> None:
+    """Those of its tracking task without state estimation."""
+    assert Observer(load_robot(describe_robot("g1")), "onboard").actor_size == 154
 
 
 def test_where_a_robot_is_and_how_fast_it_travels_is_not_onboard(
