@@ -192,10 +192,8 @@ def render_video(
     danced = read_if_path(Rollout, danced) if isinstance(danced, str | PathLike) else danced
     qpos = danced.qpos if isinstance(danced, Rollout) else danced
     if qpos is not None and np.shape(qpos)[1:] != (machine.model.nq,):
-        raise BadConfiguration(
-            f"the rollout has states of shape {np.shape(qpos)}; {machine.description.name} needs "
-            f"(steps, {machine.model.nq})"
-        )
+        needed = f"{machine.description.name} needs (steps, {machine.model.nq})"
+        raise BadConfiguration(f"the rollout has states of shape {np.shape(qpos)}; {needed}")
     track = None if landmarks is None else read_if_path(LandmarkTrack, landmarks)
     person = None if motion is None else read_if_path(SmplSequence, motion)
     source = None if video is None else Path(video)

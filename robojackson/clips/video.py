@@ -24,7 +24,6 @@ from robojackson.clips.video_container import (
     packet_times,
     pixel_aspect,
     rate,
-    step_of,
     video_stream,
 )
 from robojackson.config import config_dataclass
@@ -44,6 +43,9 @@ MISSING_FRAMES_ALLOWED = 2
 """Frames that an index may promise beyond those in the file: some writers count one too many."""
 DAMAGE_ALLOWED = 0.2
 """Share of the frames that may be damaged; they are left out."""
+WITHOUT_DISPLAY_TIMES = "avi"
+"""Container whose times are of the order in which frames are decoded, not shown: with B-frames
+frame n is shown at the n-th of all times."""
 
 
 @config_dataclass
@@ -143,7 +145,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         raise UnreadableVideo("the file declares no frame rate", path)
     if fps > FASTEST:
         raise UnreadableVideo(f"{fps:.0f} frames a second; at most {FASTEST:g} are read", path)
-    rotation = -first.rotation % 360
+    rotation = -90 * round(first.rotation / 90) % 360  # as pictures are turned (`upright`)
     size = (round(first.width * aspect), first.height)
     size = size[::-1] if rotation % 180 else size
     step = frame_step(fps)
@@ -192,11 +194,13 @@ def timed_frames(
 
 def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
     """Yield timestamps, frames and the aspect of their pixels, of every frame that is read."""
-    step = step_of(path)
+    stamps = packet_times(path)
     with opened(path) as container:
         stream = video_stream(container, path)
+        in_order = container.format.name == WITHOUT_DISPLAY_TIMES
         stream.thread_type, aspect = "NONE", pixel_aspect(stream)
-        declared = declared_rate(stream) or 1.0  # where frames have no times
+        declared = declared_rate(stream)
+        step = frame_step(rate(stamps, declared))
         time_s, good, bad = 0.0, 0, 0
         packets = container.demux(stream)
         while True:
@@ -205,14 +209,16 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
                 frames = packet.decode() if packet is not None else []
             except av.FFmpegError as cause:
                 bad += 1
-                if bad > max(1.0, DAMAGE_ALLOWED * max(good + bad, stream.frames)):
+                if bad > max(1.0, DAMAGE_ALLOWED * max(good + bad, stream.frames, len(stamps))):
                     raise TruncatedVideo(f"damaged after {time_s:.2f} s ({cause})", path) from cause
                 continue
             if packet is None:
                 return
             for frame in frames:
                 good += 1
-                time_s = good / declared if frame.time is None else float(frame.time)
+                time_s = good / (declared or 1.0) if frame.time is None else float(frame.time)
+                if in_order and len(stamps):
+                    time_s = float(stamps[min(good + bad, len(stamps)) - 1])
                 if (good - 1) % step == 0:
                     yield time_s, frame, aspect
 

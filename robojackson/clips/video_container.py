@@ -8,6 +8,7 @@ than `FASTEST` a second, of which about `ANALYSED` are read.
 
 from itertools import islice
 from pathlib import Path
+from typing import cast
 
 import av
 import numpy as np
@@ -118,10 +119,17 @@ def pixel_aspect(stream: VideoStream) -> float:
 
 def first_frame(container: av.container.InputContainer, path: Path) -> VideoFrame:
     """Return the first frame that can be decoded."""
-    try:
-        return next(iter(container.decode(video_stream(container, path))))
-    except (StopIteration, av.FFmpegError) as cause:
-        raise UnreadableVideo("the file holds no frame that can be decoded", path) from cause
+    packets = container.demux(video_stream(container, path))
+    while True:
+        try:
+            packet = next(packets, None)
+            frames = packet.decode() if packet is not None else []
+        except av.FFmpegError:
+            continue
+        if packet is None:
+            raise UnreadableVideo("the file holds no frame that can be decoded", path)
+        if frames:
+            return cast(VideoFrame, frames[0])
 
 
 def packet_times(path: Path) -> Float[np.ndarray, " T"]:
@@ -165,14 +173,3 @@ def frame_step(fps: float) -> int:
     """Return n where every n-th frame of a file is read: 1 below 90 frames a second, 2 of 120, 4 of
     240. A dance needs no more, and time and memory grow with the frames."""
     return max(1, round(fps / ANALYSED))
-
-
-def step_of(path: Path) -> int:
-    """Return the step between the frames of a file that are read.
-
-    Raises:
-        UnreadableVideo, TruncatedVideo: the file cannot be read to its end.
-    """
-    with opened(path) as container:
-        declared = declared_rate(video_stream(container, path))
-    return frame_step(rate(packet_times(path), declared))

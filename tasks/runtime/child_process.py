@@ -18,7 +18,8 @@ from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.pipeline.app_folder import app_folder
 from tasks.runtime.run_logger import run_logger
 
-LOG = "process.log"
+LOG, LONGEST = "process.log", 2**16
+"""File of what a process says; bytes of a line beyond which it is cut into parts."""
 
 
 async def run_process(
@@ -69,11 +70,18 @@ async def _forward(process: Process, log_file: Path, last: deque[str]) -> None:
 
 
 async def _lines(process: Process) -> AsyncIterator[str]:
+    """Yield what a process says, line by line; one that is too long in parts."""
     assert process.stderr is not None
-    async for raw in process.stderr:
-        line = raw.decode(errors="replace").rstrip()
-        if line:
-            yield line
+    rest = b""
+    while chunk := await process.stderr.read(LONGEST):
+        *lines, rest = (rest + chunk).split(b"\n")
+        if len(rest) > LONGEST:
+            lines, rest = [*lines, rest], b""
+        for raw in lines:
+            if line := raw.decode(errors="replace").rstrip():
+                yield line
+    if line := rest.decode(errors="replace").rstrip():
+        yield line
 
 
 async def _read(process: Process) -> bytes:

@@ -67,6 +67,14 @@ def test_what_the_process_says_is_in_its_log(tmp_path: Path) -> None:
     assert (tmp_path / child_process.LOG).read_text() == "10 steps\n"
 
 
+@pytest.mark.parametrize("letters", [1_000, 70_000, 300_000])
+def test_a_line_of_any_length_ends_no_training(letters: int, tmp_path: Path) -> None:
+    code = f"import sys; print('x' * {letters} + '\\nready', file=sys.stderr)"
+    run(code, tmp_path)
+    *parts, last = (tmp_path / child_process.LOG).read_text().split()
+    assert ("".join(parts), last) == (letters * "x", "ready")
+
+
 @pytest.mark.medium
 def test_a_process_that_does_not_end_is_killed(tmp_path: Path) -> None:
     with pytest.raises(TrainingFailed, match="did not end within"):

@@ -136,7 +136,7 @@ def _by_motion(one: View, two: View) -> list[Offset]:
 def _calibrated(one: View, two: View, began_s: float) -> _Calibrated | None:
     """Fit the second camera if its clip began then; None where too few frames are common."""
     pair = _together(one, two, began_s)
-    seen = (pair.both > 0.0).any(1)
+    seen = (pair.both[:, BODY] > 0.0).any(1)
     if seen.sum() < LEAST_FRAMES:
         return None
     bodies = [points[seen][:, BODY] for points in pair.points]

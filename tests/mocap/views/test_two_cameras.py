@@ -156,6 +156,19 @@ def test_two_flat_views_make_a_deep_one(dancer: np.ndarray, hip_shake: LandmarkT
 
 
 @pytest.mark.medium
+def test_frames_in_which_only_a_face_is_seen_do_not_calibrate(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    visibility = np.ones((len(dancer), 33))
+    visibility[3:6, 11:] = 0.0  # shoulders to feet are out of the picture
+    tracks = [
+        replace(filmed(points, hip_shake), visibility=visibility)
+        for points in (dancer, second_frame(dancer))
+    ]
+    found = recover_together(*tracks, MocapConfig(), 0.0)
+    assert np.isfinite(found.keypoints_w).all()
+
+
 def test_gravity_of_two_cameras_is_that_of_balance(
     dancer: np.ndarray, hip_shake: LandmarkTrack
 ) -> None:

@@ -1,0 +1,72 @@
+"""Frames of containers that say little: their times, and damage at their beginning."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from robojackson.clips.trim import trim
+from robojackson.clips.video import VideoLimits, probe, read_frames, timed_frames
+from robojackson.errors import UnreadableVideo
+
+FPS, FRAMES = 30, 40
+
+
+def written(path: Path, codec: str, pixels: str = "yuv420p", frames: int = FRAMES) -> Path:
+    """Write a video whose n-th picture is grey by 5 n."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=FPS)
+        stream.width, stream.height, stream.pix_fmt = 160, 120, pixels
+        for number in range(frames):
+            image = np.full((120, 160, 3), 5 * number % 250, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode(None))
+    return path
+
+
+def harmed(source: Path, path: Path, which: set[int]) -> Path:
+    """Copy a video with garbage instead of some of its packets."""
+    with av.open(str(source)) as read, av.open(str(path), "w") as made:
+        stream = made.add_stream_from_template(read.streams.video[0])
+        packets = (packet for packet in read.demux(video=0) if packet.size)
+        for number, packet in enumerate(packets):
+            kept = packet
+            if number in which:
+                kept = av.Packet(b"\x11" * packet.size)
+                kept.pts, kept.dts, kept.time_base = packet.pts, packet.dts, packet.time_base
+            kept.stream = stream
+            made.mux(kept)
+    return path
+
+
+def test_pictures_of_an_avi_with_frames_in_between_are_in_order(tmp_path: Path) -> None:
+    """AVI has times of the decoding order alone, which the decoder hands out with the pictures."""
+    path = written(tmp_path / "a.avi", "libx264")
+    found = list(timed_frames(path))
+    np.testing.assert_allclose([time_s for time_s, _ in found], np.arange(FRAMES) / FPS, atol=2e-3)
+    greys = [image.mean() for _, image in found]
+    assert (np.diff(greys) > 2).all()
+    cut = tmp_path / "cut.mp4"
+    trim(path, 0.2, 1.0, cut)
+    assert len(list(read_frames(cut))) == 24
+
+
+@pytest.mark.parametrize("suffix", [".avi", ".mkv"])
+@pytest.mark.parametrize("which", [{0}, {1, 2}, {50, 51, 52}])
+def test_a_few_damaged_pictures_are_left_out_wherever_they_are(
+    tmp_path: Path, suffix: str, which: set[int]
+) -> None:
+    whole = written(tmp_path / f"whole{suffix}", "mjpeg", "yuvj420p", 100)
+    path = harmed(whole, tmp_path / f"harmed{suffix}", which)
+    assert probe(path, VideoLimits()).frames == 100
+    times = [time_s for time_s, _ in timed_frames(path)]
+    assert len(times) == 100 - len(which)
+    assert (np.diff(times) > 0).all()
+
+
+def test_a_video_without_a_picture_that_can_be_decoded_is_refused(tmp_path: Path) -> None:
+    whole = written(tmp_path / "whole.mkv", "mjpeg", "yuvj420p", 10)
+    path = harmed(whole, tmp_path / "harmed.mkv", set(range(10)))
+    with pytest.raises(UnreadableVideo, match="no frame that can be decoded"):
+        probe(path, VideoLimits())
