@@ -11,6 +11,7 @@ from robojackson.api.progress_bar import bar
 from robojackson.errors import RejectedReference, UnknownName
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
 from robojackson.robot.description import RobotDescription
@@ -23,7 +24,7 @@ Counter = Callable[[int, int], None]
 Progress = bool | Counter
 """True shows a bar on stderr, False nothing; a function is called with (done, in all)."""
 RobotLike = str | PathLike[str] | RobotDescription | Robot
-Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion)
+Table = TypeVar("Table", LandmarkTrack, SmplSequence, ReferenceMotion, Rollout)
 
 
 def path_of(given: object, name: str, instead: str = "") -> Path:

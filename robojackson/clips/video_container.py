@@ -8,7 +8,6 @@ than `FASTEST` a second, of which about `ANALYSED` are read.
 
 from itertools import islice
 from pathlib import Path
-from typing import cast
 
 import av
 import numpy as np
@@ -129,7 +128,7 @@ def first_frame(container: av.container.InputContainer, path: Path) -> VideoFram
         if packet is None:
             raise UnreadableVideo("the file holds no frame that can be decoded", path)
         if frames:
-            return cast(VideoFrame, frames[0])
+            return frames[0]
 
 
 def packet_times(path: Path) -> Float[np.ndarray, " T"]:
