@@ -94,7 +94,8 @@ def back_up(
 
 
 def _require_apart(store: Store, backups: Backups) -> None:
-    if key_of(store, backups.root) is not None:
+    places = (backups.root, backups.root.resolve())
+    if any(key_of(store, place) is not None for place in places):
         raise BackupFailed(f"{backups.root} is in the store {store.root}; choose another folder")
 
 

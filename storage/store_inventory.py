@@ -23,13 +23,13 @@ KINDS: dict[Kind, str] = {
     "unused": "results that no record, run or table refers to",
     "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
     "cache": "records of finished stages, what only they refer to, gains of feedback; made again",
-    "runs": "pages and videos of finished dances, and what only they refer to",
+    "runs": "pages, videos and logs of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
 }
 """What each kind is, in the order in which they are listed."""
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
-FEEDBACK = "feedback"
-"""Where `rl.feedback.cached_feedback` keeps gains."""
+FEEDBACK, LOGS = "feedback", "tensorboard"
+"""Where `rl.feedback.cached_feedback` keeps gains, and `tasks.train_policy` logs."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)
@@ -92,7 +92,7 @@ def _entries(root: Path) -> Iterator[Path]:
             yield from _folders_with_files(path)
         elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER, FEEDBACK):
             yield from (file for file in sorted(path.rglob("*")) if file.is_file())
-        elif path.name == PAGES or _has_artifacts(path):
+        elif path.name in (PAGES, LOGS) or _has_artifacts(path):
             yield from sorted(path.iterdir())
         else:
             yield path
@@ -117,7 +117,7 @@ def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
         return "work"
     if top in (stage_records.FOLDER, FEEDBACK):
         return "cache"
-    if top in (PAGES, run_catalogue.FOLDER):
+    if top in (PAGES, LOGS, run_catalogue.FOLDER):
         return "runs"
     if len(path.parts) == 2 and top != WALKERS:
         return named(path.as_posix()) or "unused"

@@ -91,8 +91,8 @@ def _remote(url: str) -> dict[str, str | None]:
 
 
 def key_of(store: Store, path: Path) -> str | None:
-    """Return the key of a path in a local store; None elsewhere."""
+    """Return the key of a path in a local store, which may itself be a link; None elsewhere."""
     if not isinstance(store.place, LocalFolder):
         return None
-    inside, root = path.resolve(), store.place.root.resolve()
+    inside, root = path.parent.resolve() / path.name, store.place.root.resolve()
     return inside.relative_to(root).as_posix() if inside.is_relative_to(root) else None

@@ -10,10 +10,10 @@ OVERVIEW = f"""
 WITH bodies AS (
     SELECT study, move, setup, seed, policy, count(*) AS rollouts, avg(survived_s) AS survived_s,
            avg(strict_success) AS strict_success, avg(skill) AS skill,
-           bool_or(success = 1 AND survived_s < {SHORTEST_S}) AS ended_early
+           avg(survived_s) FILTER (success = 1) < {SHORTEST_S} AS ended_early
     FROM evaluations GROUP BY ALL
 ), cells AS (
-    SELECT study, move, setup, seed, bool_or(ended_early) OR
+    SELECT study, move, setup, seed, coalesce(bool_or(ended_early), false) OR
            coalesce(max(strict_success) FILTER (policy NOT IN ({TAUGHT})) >= {EASY}, false)
            AS too_short
     FROM bodies GROUP BY ALL

@@ -96,9 +96,9 @@ def of_baselines(ask: RunQuery, study: Study) -> Baselines:
 
 def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[str]:
     """Return the moves whose rollouts are too short: bodies that do not dance succeed as well."""
-    length = "max(survived_s / clip_fraction) FILTER (clip_fraction > 0)"  # whoever falls early
-    sql = f"SELECT move, {length} AS longest FROM evaluations WHERE study = $study GROUP BY ALL"
-    longest = {row["move"]: row["longest"] for row in ask(sql, {"study": study.name})}
+    length = "avg(survived_s / clip_fraction) FILTER (clip_fraction > 0)"  # whoever falls early
+    sql = f"SELECT move, {length} AS seconds FROM evaluations WHERE study = $study GROUP BY ALL"
+    lengths = {row["move"]: row["seconds"] for row in ask(sql, {"study": study.name})}
     easy = {
         move
         for move, found in baselines.items()
@@ -108,8 +108,8 @@ def too_short_moves(ask: RunQuery, study: Study, baselines: Baselines) -> list[s
             if policy not in VARIANTS
         )
     }
-    short = {m for m, seconds in longest.items() if (seconds or 0.0) < verdict.SHORTEST_S}
-    return [move for move in study.moves if move in longest and move in easy | short]
+    short = {m for m, seconds in lengths.items() if (seconds or 0.0) < verdict.SHORTEST_S}
+    return [move for move in study.moves if move in lengths and move in easy | short]
 
 
 def without_unassessed(figures: Figures, unassessed: Collection[str]) -> Figures:

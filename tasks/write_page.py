@@ -74,14 +74,14 @@ class PageSettings:
         render: How the video looks; the page shows the same moments.
         configuration: Configuration of the pass, as YAML.
         candidates: Clips that were scored, the one that is danced among them.
-        minutes: Budget of the pass.
+        longer: Options of `dance` for a longer training.
     """
 
     robot: RobotDescription
     render: VideoConfig
     configuration: str = ""
     candidates: tuple[ScoredClip, ...] = ()
-    minutes: float = 0.0
+    longer: str = ""
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
@@ -218,7 +218,7 @@ def _results(
         ],
         provenance={name: artifact.sha256[:16] for name, artifact in sorted(made.items())},
         settings=settings.configuration,
-        minutes=settings.minutes,
+        longer=settings.longer,
     )
 
 

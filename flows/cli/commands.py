@@ -199,11 +199,10 @@ def _next(kind: str, page: str, settings: "PipelineConfig") -> str:
             return with_settings({"evaluate.seconds": f"{LONG_ENOUGH_S:g}"})
         return "film or choose a range of at least two seconds (--start, --end)"
     from robojackson.cli.lifetime.interruption import with_option, with_settings
-    from robojackson.rl.config.train_config import BUDGETS
+    from robojackson.rl.config.train_config import longer_budgets
     from robojackson.rl.evaluation.verdict import longer_minutes
 
-    budgets = {f"train.{name}": getattr(settings.train, name) for name in BUDGETS}
-    if longer := {key: f"{2 * value:.12g}" for key, value in budgets.items() if value is not None}:
+    if longer := longer_budgets(settings.train):
         return with_settings(longer)  # the minutes of the pass do not count beside these
     return with_option("--minutes", f"{longer_minutes(settings.minutes):g}", unset=("minutes",))
 

@@ -11,6 +11,8 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RoboJacksonError, UnreadableVideo
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.rl.config.train_config import longer_budgets
+from robojackson.rl.evaluation.verdict import longer_minutes
 from robojackson.robot.model import RobotDescription
 from storage import artifact_tables
 from storage.artifact import Artifact
@@ -81,6 +83,13 @@ def choose(candidates: list[Candidate]) -> Candidate:
     return min(danced, key=lambda candidate: candidate.score.score_per_second)
 
 
+def longer_options(settings: PipelineConfig) -> str:
+    """Return the options of a pass whose training is longer: its own budgets, where it has some,
+    since the minutes of the pass do not count beside them."""
+    longer = [f"--set {key}={value}" for key, value in longer_budgets(settings.train).items()]
+    return " ".join(longer) or f"--minutes {longer_minutes(settings.minutes):g}"
+
+
 def page_settings(
     best: Candidate,
     candidates: Sequence[Candidate],
@@ -101,7 +110,7 @@ def page_settings(
             )
             for each in candidates
         ),
-        settings.minutes,
+        longer_options(settings),
     )
 
 

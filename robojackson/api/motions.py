@@ -171,8 +171,8 @@ def read_motion(
     Args:
         file: smpl.parquet, reference.parquet, or a file of HybrIK, NIKI, AMASS, AIST++, GVHMR, BVH
             or our csv, recognised by its content. Nothing in it is executed.
-        fps: Frames a second, where the file does not give them.
-        up: Axis that points up, where it is unusual.
+        fps: Frames a second, where the file does not give them; not for our tables.
+        up: Axis that points up, where it is unusual; not for our tables.
         config: Configuration of the camera and the floor of HybrIK's files.
 
     Returns:
@@ -181,7 +181,7 @@ def read_motion(
     Raises:
         StoreError: no such file.
         UnknownName, BadTable: no known format, or a damaged file.
-        BadConfiguration: no frame rate, or one that no motion has.
+        BadConfiguration: no frame rate, or one that no motion has; `fps` or `up` for our table.
     """
     path = path_of(file, "the motion")
     if path.suffix == TABLE:

@@ -16,7 +16,7 @@ from robojackson.cli.stages import Overrides
 from robojackson.files.file_tree import results_in
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.yaml_loader import load
-from robojackson.rl.evaluation.verdict import SHORTEST_S
+from robojackson.rl.evaluation.verdict import LEAST_MOTION_S
 
 AIRBORNE = 0.2
 """Share of frames with a foot on the floor below which axes or frame rate are doubted."""
@@ -59,7 +59,7 @@ def import_verdict(figures: Mapping[str, Any]) -> dict[str, str]:
     if share < AIRBORNE:
         sentence = f"The person hardly touches the floor ({summary}): is --up right, or --fps?"
         return {"kind": "airborne", "sentence": sentence}
-    if seconds < SHORTEST_S:
+    if seconds < LEAST_MOTION_S:
         sentence = f"The motion is too short to evaluate a robot on: {summary}."
         return {"kind": "too_short", "sentence": sentence}
     return {"kind": "whole", "sentence": f"The motion stands on the floor: {summary}."}

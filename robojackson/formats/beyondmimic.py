@@ -1,9 +1,10 @@
 """The motion .npz that BeyondMimic (`whole_body_tracking`) and mjlab train on.
 
 Keys fps [1], joint_pos, joint_vel, body_pos_w, body_quat_w (wxyz), body_lin_vel_w, body_ang_vel_w;
-float32, 50 fps, world frame, metres and radians; velocities are those of the bodies' origins. The
-first body is the root. Joints and bodies are in MuJoCo's order, which is mjlab's; Isaac Lab walks
-the tree breadth first, so two keys more, joint_names and body_names, say what the columns are.
+float32, 50 fps (an integer; float64 where a pack's rate is not whole), world frame, metres and
+radians; velocities are those of the bodies' origins. The first body is the root. Joints and bodies
+are in MuJoCo's order, which is mjlab's; Isaac Lab walks the tree breadth first, so two keys more,
+joint_names and body_names, say what the columns are.
 """
 
 import mujoco

@@ -46,19 +46,23 @@ class Fall:
             tilt=rule.tilt if tilt is None else tilt,
         )
 
+    @property
+    def cos_tilt(self) -> float:
+        """Cosine of the tilt; of one beyond half a turn it would be that of a smaller one."""
+        return float(np.cos(min(self.tilt, np.pi)))
+
     def has_fallen(
         self, qpos: Float[np.ndarray, "N nq"], target: Float[np.ndarray, "N nq"]
     ) -> Bool[np.ndarray, " N"]:
         """Return which of N robots have fallen; `target` is the reference's state at the same
         step."""
-        tilt = min(self.tilt, np.pi)  # the cosine of a larger one would be a smaller one's
         if not self.relative:
             upright = up_axis(qpos[:, 3:7])[:, 2]
-            found: np.ndarray = (qpos[:, 2] < self.height) | (upright < np.cos(tilt))
+            found: np.ndarray = (qpos[:, 2] < self.height) | (upright < self.cos_tilt)
             return found
         along = alignment(qpos, target)
         off = np.abs(qpos[:, 2] - target[:, 2])
-        result: np.ndarray = (off > self.height) | (along < np.cos(tilt))
+        result: np.ndarray = (off > self.height) | (along < self.cos_tilt)
         return result
 
 

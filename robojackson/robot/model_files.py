@@ -57,8 +57,9 @@ def _files_and_parts(path: Path) -> tuple[list[Path], list[Path]]:
     found, folders, parts = [path], [path.parent], [path]
     for part in parts:  # grows while it is read
         for tag, name in _named_in(part, path.parent, folders):
-            places = dict.fromkeys(folder / each for folder in folders for each in _read_as(name))
-            for file in places:  # which of them MuJoCo reads depends on the file and its folders
+            for file in [
+                folder / name for folder in folders
+            ]:  # which of them MuJoCo reads depends on the file and its folders
                 if file.exists() and file not in found and len(found) < MOST_FILES:
                     found.append(file)
                     parts += [file] if tag in PARTS else []
@@ -75,15 +76,12 @@ def _named_in(part: Path, root: Path, folders: list[Path]) -> list[tuple[str, st
         return [(PARTS[0], name) for name in FILES.findall(part.read_text(errors="replace"))]
     for compiler in tree.iter("compiler"):
         folders += [root / compiler.get(name, "") for name in FOLDERS]
-    named = ((each.tag, each.get("file") or each.get("filename")) for each in tree.iter())
-    return [(tag, name) for tag, name in named if name]
-
-
-def _read_as(name: str) -> list[str]:
-    """Return how a file may be meant: URDF names it in a package, of which MuJoCo takes the last
-    part."""
-    plain = name.partition("://")[2] if "://" in name else name
-    return [plain, plain.rsplit("/", 1)[-1]]
+    named = [(each.tag, name) for each in tree.iter() if (name := each.get("file"))]
+    meshes = [(each.tag, name) for each in tree.iter() if (name := each.get("filename"))]
+    for tag, name in meshes:  # of URDF, in a package; MuJoCo takes the last part
+        plain = name.partition("://")[2] or name
+        named += [(tag, plain), (tag, plain.rsplit("/", 1)[-1])]
+    return named
 
 
 def require_model_files(path: Path, place: str) -> None:

@@ -142,7 +142,7 @@ def test_headline_says_when_learning_gained_nothing(success: float, message: str
 def test_a_robot_that_does_not_dance_has_its_next_step(
     evaluation: dict[str, object], option: str
 ) -> None:
-    assert next_step(evaluation, 12.0)[1] == option
+    assert next_step(evaluation, "--minutes 24")[1] == option
 
 
 def test_the_next_step_is_below_the_verdict() -> None:

@@ -10,7 +10,7 @@ import ipaddress
 import socket
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any
 from urllib.parse import urlsplit
@@ -56,11 +56,14 @@ def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
 
 
 def _proxy_hosts(proxy: str | None) -> set[str]:
-    """Return the hosts of a proxy, or of those that the environment names."""
+    """Return the hosts of a proxy, or of those that the environment names for the web."""
     named = urllib.request.getproxies()
-    named.pop("no", None)
-    found = [host_and_port(each)[0] for each in ([proxy] if proxy else named.values())]
-    return set(filter(None, found))
+    usual = [named[kind] for kind in ("http", "https", "all") if kind in named]
+    found = set()
+    for address in [proxy] if proxy else usual:
+        with suppress(ValueError):
+            found.add(urlsplit(address if "://" in address else f"http://{address}").hostname)
+    return {host for host in found if host}
 
 
 def host_and_port(address: str) -> tuple[str, int]:

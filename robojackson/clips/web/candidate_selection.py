@@ -17,7 +17,8 @@ class SelectionConfig:
     Attributes:
         max_duration_s: A video of this length or longer is dropped, seconds; a short has less.
         top: How many of the most watched are kept, or of the first where no views are known.
-        searched: How many results to request; most of them are dropped.
+        searched: How many results to request; most of them are dropped. Folders, lists of addresses
+            and pages of servers are read to their end.
     """
 
     max_duration_s: float = Field(default=60.0, gt=0)

@@ -98,21 +98,23 @@ def with_declared(
         BadConfiguration: no such kind.
     """
     found = list(ingredients)
-    for kind, licence in declared.items():
+    for kind, licence in sorted(declared.items(), key=lambda one: one[0] == "clip"):
         if kind not in KINDS:
             raise BadConfiguration(f"--licence {kind}={licence}: kinds are {', '.join(KINDS)}")
         mine = [one for one in found if one.kind == kind and not one.is_known]
         found = [one for one in found if one not in mine]
         if kind == "clip":
-            found = [replace(one, licence=licence) if _has_clips(one) else one for one in found]
+            found = [_as_the_clip(one, licence) for one in found]
         found += [replace(one, licence=licence, note=DECLARED) for one in mine]
         found += [] if mine else [Ingredient(kind, kind, licence, DECLARED)]
     return sorted(found, key=lambda one: KINDS.index(one.kind))
 
 
-def _has_clips(ingredient: Ingredient) -> bool:
-    """Return whether it has the licence of a clip whose licence is not known."""
-    return not ingredient.is_known and ingredient.note.endswith(OF_CLIP)
+def _as_the_clip(ingredient: Ingredient, licence: str) -> Ingredient:
+    """Return an input with the licence that the clip has now, where it has the clip's."""
+    if ingredient.is_known or not ingredient.note.endswith(OF_CLIP):
+        return ingredient
+    return replace(ingredient, licence=licence, note=f"{ingredient.note}: {DECLARED}")
 
 
 def together(ingredients: Iterable[Ingredient]) -> dict[str, Answer]:

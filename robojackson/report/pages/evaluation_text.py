@@ -7,7 +7,7 @@ from typing import Any
 from robojackson.report.quantities import POLICY_TITLES, Quantity, format_value, quantities
 from robojackson.report.web.beats import TITLES
 from robojackson.rl.config.evaluate_config import TRAINED
-from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH, longer_minutes
+from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 Evaluation = Mapping[str, Any]
 """The content of evaluation.json."""
@@ -70,12 +70,12 @@ def headline(evaluation: Evaluation) -> str:
     return f"{text}; a baseline that learnt nothing ({best}) does {how}: {figure}."
 
 
-def next_step(evaluation: Evaluation, minutes: float) -> tuple[str, str]:
+def next_step(evaluation: Evaluation, longer: str) -> tuple[str, str]:
     """Return what to do about a robot that does not dance, and the option of `dance` that does it;
     empty texts for one that dances.
 
     Args:
-        minutes: Budget of the pass.
+        longer: Options of a longer training.
     """
     kind = evaluation.get("verdict", {}).get("kind")
     if kind in (None, "dances"):
@@ -84,7 +84,7 @@ def next_step(evaluation: Evaluation, minutes: float) -> tuple[str, str]:
         return "Film or choose a range of at least two seconds:", "--start, --end"
     if "tracker" in evaluation:
         return "Train the robot on this dance: the same command without", "--instant"
-    return "Train longer: the same command with", f"--minutes {longer_minutes(minutes):g}"
+    return "Train longer: the same command with", longer
 
 
 def tiles(evaluation: Evaluation) -> list[Quantity]:

@@ -63,7 +63,7 @@ class Results:
         beats: Beats of motions and music.
         provenance: Digests of the results, by name.
         settings: The configuration, as YAML.
-        minutes: Budget of the pass.
+        longer: Options of `dance` for a longer training.
     """
 
     title: str
@@ -85,7 +85,7 @@ class Results:
     beats: Sequence[Verdict] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     settings: str = ""
-    minutes: float = 0.0
+    longer: str = ""
 
 
 def page_content(results: Results, video: str | None) -> PageContent:
@@ -118,7 +118,7 @@ def page_content(results: Results, video: str | None) -> PageContent:
         beats=results.beats,
         provenance=results.provenance,
         settings=results.settings,
-        next_step=next_step(results.evaluation, results.minutes),
+        next_step=next_step(results.evaluation, results.longer),
     )
 
 

@@ -93,7 +93,7 @@ def live_data(
         "fall": {
             "relative": fall.relative,
             "height": fall.height,
-            "cosTilt": float(np.cos(fall.tilt)),
+            "cosTilt": fall.cos_tilt,
         },
         "shape": robot_shape(robot.model),
         "records": live_records(policy, reference, robot),

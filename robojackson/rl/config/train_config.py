@@ -39,6 +39,12 @@ BUDGETS = ("steps", "minutes", "cpu_minutes")
 """Keys of the budgets of a training."""
 
 
+def longer_budgets(config: "TrainConfig") -> dict[str, str]:
+    """Return twice the budgets of a training, by key path of a pass; nothing where it has none."""
+    given = {f"train.{name}": getattr(config, name) for name in BUDGETS}
+    return {key: f"{2 * value:.12g}" for key, value in given.items() if value is not None}
+
+
 @config_dataclass
 class TrainConfig:
     """One training run. It ends at the first of its budgets that is reached.

@@ -147,11 +147,17 @@ def _who(policy: Evaluated) -> dict[str, str]:
 
 
 def environment_of(policy: Evaluated, control: ControlConfig) -> TrackConfig | PaperConfig:
-    """Return the environment of the policy's own reward, without curiosity."""
+    """Return the environment of the policy's own reward, without curiosity.
+
+    Raises:
+        BadPolicy: it was trained to send torques in mode `track`.
+    """
     if not isinstance(policy, Policy):
         return TrackConfig(control=control)
     held = policy.facts.get("environment")
     paper = mode_of(policy) == "paper"
+    if control.law == "torque" and not paper:
+        raise BadPolicy("the policy has law torque of mode paper in mode track: train it again")
     if not isinstance(held, Mapping):
         return PaperConfig() if paper else TrackConfig(control=control)
     kind: type[PaperConfig | TrackConfig] = PaperConfig if paper else TrackConfig

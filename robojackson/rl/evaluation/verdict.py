@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Kind = Literal["too_short", "untrained", "falls", "learning", "partly", "dances"]
-SHORTEST_S = 1.75
-"""Mean length below which rollouts are not evaluated: a body that does nothing does not fall that
-fast. Those of a motion of two seconds that ends are as long, since they begin in its first
-quarter."""
+LEAST_MOTION_S, SHORTEST_S = 2.0, 1.7
+"""Length below which a motion is too short to evaluate a robot on, and mean length of its rollouts,
+which begin in the first quarter of a motion that ends: a body that does nothing does not fall that
+fast."""
 EASY = 0.5
 """Strict success of a body that does not dance above which an evaluation is meaningless."""
 DANCES = 0.95

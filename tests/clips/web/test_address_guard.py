@@ -53,6 +53,7 @@ def test_a_proxy_of_the_environment_may_be_anywhere(
 ) -> None:
     monkeypatch.setenv("HTTPS_PROXY", named)
     monkeypatch.setenv("NO_PROXY", "localhost")
+    monkeypatch.setenv("CORP_PROXY", "http://localhost:auto")
     with public_only(allowed=False):
         assert socket.getaddrinfo("127.0.0.1", 3128)
         with pytest.raises(PrivateAddress):

@@ -7,6 +7,8 @@ import pytest
 from flows.video_pass import scored_candidates
 from flows.video_pass.scored_candidates import Candidate
 from robojackson.clips.quality.stability import Stability
+from robojackson.pipeline.pipeline_config import PipelineConfig
+from robojackson.pipeline.yaml_loader import load
 
 
 def candidate(name: str, score: float, detected: int = 12) -> Candidate:
@@ -29,3 +31,14 @@ NO_PERSON = candidate("c.mp4", 0.0, detected=0)
 )
 def test_every_clip_has_its_reason(clip: Candidate, alone: bool, reason: str) -> None:
     assert scored_candidates._reason(clip, BEST, alone) == reason
+
+
+@pytest.mark.parametrize(
+    ("overrides", "options"),
+    [({"minutes": 12}, "--minutes 24"), ({"train.steps": 9000}, "--set train.steps=18000")],
+)
+def test_the_page_advises_what_makes_the_training_longer(
+    overrides: dict[str, int], options: str
+) -> None:
+    settings = load(PipelineConfig, "base", overrides)
+    assert scored_candidates.longer_options(settings) == options

@@ -135,6 +135,11 @@ def test_a_declared_licence_keeps_the_digest_and_reaches_what_has_it_from_the_cl
     assert (clip.licence, clip.sha256) == ("CC-BY-4.0", "2d71")
     assert motion.licence == "CC-BY-4.0"
     assert together([clip, motion])["sell"] == "notice"
+    both = with_declared(given, {"clip": "CC-BY-NC-4.0", "motion": "MIT"})
+    assert [(one.kind, one.licence) for one in both] == [
+        ("clip", "CC-BY-NC-4.0"),
+        ("motion", "MIT"),
+    ]
 
 
 def test_several_licences_allow_what_the_strictest_does() -> None:

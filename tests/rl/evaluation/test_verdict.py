@@ -21,7 +21,7 @@ STATUE = {"statue": figures(1.6, 0.0, 0.0)}
         (figures(1.9, 0.0), STATUE, 10.0, 5, "falls"),
         (figures(10, 0.4), {"statue": figures(10, 0.0)}, 10.0, 5, "learning"),
         (figures(0.5, 1.0), {"statue": figures(0.5, 1.0)}, 0.5, 5, "too_short"),
-        (figures(1.7, 1.0), STATUE, 1.7, 5, "too_short"),
+        (figures(1.6, 1.0), STATUE, 1.6, 5, "too_short"),
         (figures(10, 1.0), {"random": figures(9, 0.9)}, 10.0, 5, "too_short"),
         (figures(1.0, 0.0), STATUE, 10.0, 0, "untrained"),
         (figures(1.0, 1.0), STATUE, 1.0, 0, "too_short"),
