@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.errors import BadPolicy
 from robojackson.motion.floor_move import FloorMove
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
