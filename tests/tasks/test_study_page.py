@@ -64,7 +64,7 @@ def publish(store: Store, move: str, setup: str, seed: int) -> None:
 def rollout(names: dict[str, Any], policy: str, worth: float) -> dict[str, Any]:
     return {
         **names, "policy": policy, "phase": 0, "reset": 0, "survived_s": worth, "fell": False,
-        "clip_fraction": 1.0, "success": 1.0, "strict_success": 0.5 * (policy == "trained"),
+        "clip_fraction": worth / 10, "success": 1.0, "strict_success": 0.5 * (policy == "trained"),
         "return_own": worth,
         "limb_gain_head": 0.5, "limb_gain_left_hand": 0.7,
     }  # fmt: skip
