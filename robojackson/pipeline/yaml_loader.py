@@ -192,7 +192,7 @@ def _expected(cause: ValidationError) -> str:
     errors = cause.errors()
     key = errors[0]["loc"]
     if not key or not _is_branch(key[-1]):
-        return errors[0]["msg"]
+        return errors[0]["msg"].removeprefix("Value error, ")
     messages = [error["msg"] for error in errors if error["loc"][:-1] == key[:-1]]
     return " or ".join(
         [messages[0], *(each.removeprefix("Input should be ") for each in messages[1:])]

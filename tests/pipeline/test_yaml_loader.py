@@ -313,6 +313,11 @@ def test_a_key_of_one_section_is_found_there() -> None:
         yaml_loader.load(PipelineConfig, "base", {"phases": 24})
 
 
+def test_a_value_that_a_rule_of_ours_refuses_is_explained_by_the_rule_alone() -> None:
+    with pytest.raises(BadConfiguration, match=r"'tqc.entropy' is 'auto_0': auto_0 begins at zero"):
+        yaml_loader.load(TrainConfig, None, {"tqc.entropy": "auto_0"})
+
+
 @pytest.mark.parametrize("section_first", [True, False])
 def test_a_key_wins_over_its_whole_section(section_first: bool) -> None:
     """An option such as --seed is a key; a section that is typed after it must not undo it."""

@@ -62,14 +62,27 @@ def _proxy_hosts(proxy: str | None) -> set[str]:
     found = set()
     for address in [proxy] if proxy else usual:
         with suppress(ValueError):
-            found.add(urlsplit(address if "://" in address else f"http://{address}").hostname)
+            found.add(host_of(address))
     return {host for host in found if host}
 
 
+def host_of(address: str) -> str:
+    """Return the host of an address; one without a scheme is a proxy's.
+
+    Raises:
+        ValueError: it is no address.
+    """
+    return urlsplit(address if "://" in address else f"http://{address}").hostname or ""
+
+
 def host_and_port(address: str) -> tuple[str, int]:
-    """Return the host and port of an address; one without a scheme is a proxy's."""
+    """Return the same with the port.
+
+    Raises:
+        ValueError: it is no address, or the port no number.
+    """
     parts = urlsplit(address if "://" in address else f"http://{address}")
-    return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)
+    return host_of(address), parts.port or PORTS.get(parts.scheme, 80)
 
 
 def is_public(address: str) -> bool:

@@ -6,9 +6,10 @@ A search without a network would otherwise start Prefect's server, and retry aga
 import socket
 import threading
 import urllib.request
+from contextlib import suppress
 from urllib.parse import urlsplit
 
-from robojackson.clips.web.address_guard import host_and_port
+from robojackson.clips.web.address_guard import host_and_port, host_of
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.errors import SearchFailed
 
@@ -34,8 +35,15 @@ def require_reachable(page: str, proxy: str | None = None, patience_s: float = P
     through = proxy or _usual_proxy(page, host)
     reason = _refusal(through or page, patience_s)
     if reason:
-        via = f" through the proxy {host_and_port(through)[0]}" if through else ""
+        via = f" through the proxy {_named(through)}" if through else ""
         raise SearchFailed(f"no connection to {clean_text(host)}{via} ({reason}): {ADVICE}")
+
+
+def _named(proxy: str) -> str:
+    """Return the host of a proxy; what was given without a password, where it is no address."""
+    with suppress(ValueError):
+        return host_of(proxy)
+    return clean_text(proxy.rpartition("@")[2])
 
 
 def _usual_proxy(page: str, host: str) -> str:

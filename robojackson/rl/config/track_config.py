@@ -241,7 +241,7 @@ class TrackConfig:
     @model_validator(mode="after")
     def _goes_together(self) -> "TrackConfig":
         if self.control.law == "torque":
-            raise ConflictingValues("law torque is of mode paper; pd and hold are", "control.law")
+            raise ConflictingValues("law torque is of mode paper: take pd or hold", "control.law")
         if self.differences and self.observation != "onboard":
             reason = "differences is for observation onboard; the others have more of the reference"
             raise ConflictingValues(reason, "differences", "observation")

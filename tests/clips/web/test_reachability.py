@@ -61,6 +61,13 @@ def test_behind_a_proxy_only_the_proxy_has_to_answer(
     require_reachable("https://nowhere.invalid", None if by_environment else web.url)
 
 
+@pytest.mark.parametrize("proxy", ["http://x:auto", "http://me:se/cret@x:80"])
+def test_a_proxy_that_is_no_address_is_one_line(proxy: str) -> None:
+    with pytest.raises(SearchFailed, match=r"no connection to host through the proxy") as failed:
+        require_reachable("https://host/", proxy)
+    assert "cret" not in str(failed.value) or "me" not in str(failed.value)
+
+
 def test_a_proxy_that_does_not_answer_is_named() -> None:
     with pytest.raises(SearchFailed, match=r"nowhere\.invalid through the proxy 127\.0\.0\.1"):
         require_reachable("https://nowhere.invalid", CLOSED_PORT)
