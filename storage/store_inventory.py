@@ -13,6 +13,7 @@ from typing import Literal
 
 from robojackson.errors import StoreError
 from robojackson.files.local_folder import TEMPORARY, LocalFolder
+from robojackson.rl.tensorboard_log import LOGS
 from storage import candidate_catalogue, run_catalogue, stage_records
 from storage.leftovers import PROCESS, TASK, is_held
 from storage.store import HELD, Store
@@ -28,8 +29,8 @@ KINDS: dict[Kind, str] = {
 }
 """What each kind is, in the order in which they are listed."""
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
-FEEDBACK, LOGS = "feedback", "tensorboard"
-"""Where `rl.feedback.cached_feedback` keeps gains, and `tasks.train_policy` logs."""
+FEEDBACK = "feedback"
+"""Where `rl.feedback.cached_feedback` keeps gains."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)

@@ -57,9 +57,8 @@ def _files_and_parts(path: Path) -> tuple[list[Path], list[Path]]:
     found, folders, parts = [path], [path.parent], [path]
     for part in parts:  # grows while it is read
         for tag, name in _named_in(part, path.parent, folders):
-            for file in [
-                folder / name for folder in folders
-            ]:  # which of them MuJoCo reads depends on the file and its folders
+            for folder in folders:  # MuJoCo reads from one of them
+                file = folder / name
                 if file.exists() and file not in found and len(found) < MOST_FILES:
                     found.append(file)
                     parts += [file] if tag in PARTS else []

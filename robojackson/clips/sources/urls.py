@@ -35,10 +35,11 @@ def search(
 
 
 def _candidate(url: str, query: str, now: datetime) -> VideoCandidate:
-    page, _, asked = url.partition("?")
+    page, _, parameters = url.partition("?")
     last = page.rstrip("/").rsplit("/", 1)[-1]
     name = safe_name(last.rsplit(".", 1)[0], url)
-    title = f"{last}?{asked}" if asked and "." not in last else last  # watch?v=..., but clip.mp4
+    is_named = "." in last or not parameters  # clip.mp4, but watch?v=...
+    title = last if is_named else f"{last}?{parameters}"
     return VideoCandidate(name, url, clean_text(title), query, GENERIC, retrieved_at=now)
 
 
