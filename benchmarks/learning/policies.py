@@ -76,11 +76,13 @@ MOVES = {
     "g1_walk": Move("clips/walk.mp4", 15, 0.98, 0.93, 0.7, robot="g1", mpjpe_mm=23),
     "g1_dance_b": Move("clips/dance_b.mp4", 15, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32),
     "g1_walk_recaptured": Move("clips/walk.mp4", 15, 0.98, 0.93, 0.7, robot="g1", mpjpe_mm=23),
+    "g1_walk_closed": Move("clips/walk.mp4", 15, 0.98, 0.93, 0.7, robot="g1", mpjpe_mm=23),
     "g1_dance_b_recaptured": Move(
         "clips/dance_b.mp4", 5, 0.98, 0.92, 0.72, False, robot="g1", mpjpe_mm=32
     ),
     "g1_dance_a": Move("clips/dance_a.mp4", 30, 0.88, 0.75, 0.55, False, robot="g1", mpjpe_mm=55),
     "g1_dance_a_loop": Move("clips/dance_a.mp4", 5, 0.88, 0.75, 0.55, robot="g1", mpjpe_mm=55),
+    "g1_dance_a_closed": Move("clips/dance_a.mp4", 5, 0.88, 0.75, 0.55, robot="g1", mpjpe_mm=55),
     "g1_authors_apt1": Move("apt1", 15, 0.98, 0.93, 0.58, False, True, robot="g1", mpjpe_mm=12),
     "g1_authors_walk": Move("walk", 15, 0.98, 0.93, 0.68, False, True, robot="g1", mpjpe_mm=24),
     **{

@@ -47,12 +47,12 @@ def actuation_of(
     """Bind the numbers of the description to the hinges of a compiled model.
 
     Gains are those that are named; else those of the natural frequency f and damping ratio z of
-    the PD law with the hinge's armature I, kp = I (2 pi f)^2 and kd = 2 z I 2 pi f (BeyondMimic,
-    2025, appendix); else multiples of the torque limit.
+    the PD law with the hinge's armature I, kp = I (2 pi f)^2 and kd = 2 z sqrt(I kp) (BeyondMimic,
+    2025, appendix); else multiples of the torque limit. A damping ratio holds for any kp.
 
     Raises:
         UnknownName: a hinge or pattern that matches none.
-        BadConfiguration: a natural frequency of a hinge without armature.
+        BadConfiguration: a natural frequency or a damping ratio of a hinge without armature.
     """
 
     def named(key: str) -> Float[np.ndarray, " J"]:
@@ -61,15 +61,23 @@ def actuation_of(
     limit = torque_limits(model, description, joints)
     armature = model.dof_armature[6:]
     turns, ratio = 2 * np.pi * named("natural_frequency"), named("damping_ratio")
-    for joint in np.flatnonzero((turns > 0) & (armature == 0) & np.isnan(named("stiffness"))):
-        raise BadConfiguration(
-            f"{where(description, 'natural_frequency')}: {joints[joint]} has no armature, so that "
-            "its gains would be zero; name its armature, or its stiffness and damping"
-        )
-    ratio = np.where(np.isnan(ratio), DAMPING_RATIO, ratio)
-    stiffness = _first(named("stiffness"), armature * turns**2, STIFFNESS_OF_LIMIT * limit)
+    given = {"stiffness": named("stiffness"), "damping": named("damping")}
+    for key, needs, gain in (
+        ("natural_frequency", turns, given["stiffness"]),
+        ("damping_ratio", ratio, given["damping"]),
+    ):
+        for joint in np.flatnonzero((needs > 0) & (armature == 0) & np.isnan(gain)):
+            raise BadConfiguration(
+                f"{where(description, key)}: {joints[joint]} has no armature, so that its gains "
+                "would be zero; name its armature, or its stiffness and damping"
+            )
+    ratio = np.where(np.isnan(ratio) & (turns > 0), DAMPING_RATIO, ratio)
+    stiffness = _first(given["stiffness"], armature * turns**2, STIFFNESS_OF_LIMIT * limit)
+    driven = np.where(np.isfinite(stiffness), stiffness, np.nan)
     damping = _first(
-        named("damping"), 2 * ratio * armature * turns, DAMPING_OF_STIFFNESS * stiffness
+        given["damping"],
+        2 * ratio * np.sqrt(armature * driven),
+        DAMPING_OF_STIFFNESS * stiffness,
     )
     scale = named("action_scale")
     speed = named("speed_limits")

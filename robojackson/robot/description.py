@@ -162,7 +162,8 @@ class RobotDescription:
         damping: Hinge -> derivative gain, Nm s/rad; where not named, that of the damping ratio,
             else a tenth of the proportional gain.
         natural_frequency: Hinge -> natural frequency of armature and PD law, Hz.
-        damping_ratio: Hinge -> damping ratio of the same; 2 where only the frequency is named.
+        damping_ratio: Hinge -> damping ratio of armature and PD law, whether its stiffness comes
+            from a frequency or not; 2 where only the frequency is named.
         action_scale: Hinge -> how far a full action of a policy moves its target, rad.
         robust_action_factor: Factor on `action_scale` where a training pushes the robot: pushes
             need more torque than a dance.

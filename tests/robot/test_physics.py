@@ -228,6 +228,19 @@ def test_gains_of_a_natural_frequency_are_those_of_a_damped_oscillator() -> None
     np.testing.assert_allclose(found.damping / (2 * np.sqrt(found.stiffness * 0.02)), 1.5)
 
 
+@pytest.mark.parametrize("stiffness", [{"*": 40.0}, {}])
+def test_a_damping_ratio_holds_for_any_stiffness(stiffness: dict[str, float]) -> None:
+    """It was ignored where no natural frequency was named beside it."""
+    found = altered(stiffness=stiffness, damping={}, armature={"*": 0.02}, damping_ratio={"*": 0.7})
+    gains = found.actuation
+    np.testing.assert_allclose(gains.damping / (2 * np.sqrt(gains.stiffness * 0.02)), 0.7)
+
+
+def test_a_damping_ratio_needs_an_armature() -> None:
+    with pytest.raises(BadConfiguration, match="damping_ratio.*has no armature"):
+        altered(damping={}, armature={"*": 0.0}, damping_ratio={"*": 0.7})
+
+
 def test_the_last_pattern_that_matches_counts() -> None:
     scale = altered(action_scale={"*": 0.4, "left_*": 0.2}).actuation.action_scale
     names = load_robot(HUMANOID).joint_names
