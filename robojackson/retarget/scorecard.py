@@ -86,7 +86,7 @@ def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
     cycle_offset = motion.cycle_offset if motion.cyclic else None
     hinges = motion.qpos[:, 7:]
     steps = forward_velocities(motion.qpos, motion.dt, cycle_offset)[:, 6:]
-    fastest = max(float(np.abs(steps).max()), float(np.abs(motion.qvel[:, 6:]).max()))
+    speeds = np.maximum(np.abs(steps).max(0), np.abs(motion.qvel[:, 6:]).max(0))
     arrays = (motion.qpos, motion.qvel, motion.body_pos_w, motion.keypoints_w, motion.torque_ratio)
     return {
         "nan_count": float(sum(np.count_nonzero(~np.isfinite(a)) for a in arrays)),
@@ -97,8 +97,8 @@ def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
             np.degrees(retarget_error.limit_excess(hinges, robot.lower, robot.upper).max())
         ),
         "quat_error": float(np.abs(np.linalg.norm(motion.qpos[:, 3:7], axis=1) - 1).max()),
-        "joint_speed_max_rad_s": fastest,
-        "speed_over_limit": fastest / robot.description.max_joint_speed,
+        "joint_speed_max_rad_s": float(speeds.max()),
+        "speed_over_limit": float((speeds / robot.motion_speed_limit).max()),
         "hinge_jerk_rms_rad_s3": retarget_error.hinge_jerk_rms(hinges, motion.dt),
     }
 

@@ -182,18 +182,18 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
     """Measure penetration, hinge speed, slip and accelerations against the bars."""
     touches = Detector(problem.robot, 0.0).touches(qpos)
     deepest = -float(touches.distance.min(initial=0.0))
-    fastest = float(np.abs(problem.velocity(qpos)[:, 6:]).max())
+    speeds = np.abs(problem.velocity(qpos)[:, 6:])
     posed, aims = pose(problem.tree, qpos), problem.targets
     slip, fast_slip = _slip(problem, posed)
     found, required = (_acceleration(p, aims) for p in (posed.site_pos, aims.keypoints_w))
     return Faults(
         deepest_m=deepest,
-        fastest=fastest,
+        fastest=float(speeds.max()),
         slip_m_s=slip,
         acceleration_m_s2=found,
         jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * required),
         deep=deepest > config.depth_bar_m,
-        fast=fastest > problem.robot.description.max_joint_speed,
+        fast=bool((speeds > problem.robot.motion_speed_limit).any()),
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,
     )
 

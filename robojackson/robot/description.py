@@ -155,7 +155,8 @@ class RobotDescription:
         torque_limits: Hinge, or pattern with `*`, -> torque limit, Nm. A hinge without an actuator
             in the MJCF, or with a servo, gets a motor of that limit. Here and below the last
             pattern that matches counts.
-        speed_limits: Hinge -> speed limit of its motor, rad/s; `max_joint_speed` where not named.
+        speed_limits: Hinge -> speed limit of its motor, rad/s, which a reference motion keeps as
+            well; `max_joint_speed` where not named.
         armature: Hinge -> rotor inertia seen at the hinge, kg m^2; the MJCF's where not named.
         stiffness: Hinge -> proportional gain of the PD law, Nm/rad; where not named, that of the
             natural frequency, else four times the torque limit.

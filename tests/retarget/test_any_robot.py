@@ -129,6 +129,19 @@ def test_the_walk_keeps_all_hard_bars(motion: ReferenceMotion):
 
 
 @pytest.mark.medium
+def test_a_slow_motor_bounds_its_hinge(description, small: Robot, motion: ReferenceMotion):
+    """Only `max_joint_speed` bounded a motion, whatever the motors' own `speed_limits` said."""
+    knee = next(i for i, name in enumerate(small.joint_names) if "knee" in name)
+    limit = 0.8 * float(np.abs(motion.qvel[:, 6 + knee]).max())
+    limits = {small.joint_names[knee]: limit}
+    slower = load_robot(replace(description, speed_limits=limits))
+    config = RetargetConfig(tempo=1.0, repair=RepairConfig(target_share=0.0))
+    found = retarget_motion(human("walk"), slower, config)
+    assert np.abs(found.qvel[:, 6 + knee]).max() <= limit
+    assert found.scorecard["speed_over_limit"] <= 1
+
+
+@pytest.mark.medium
 def test_a_motion_for_hinges_without_motors_is_read_again(
     motion: ReferenceMotion, small: Robot, tmp_path: Path
 ):

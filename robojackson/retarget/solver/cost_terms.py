@@ -106,9 +106,9 @@ def _add_differences(
 
 def _speed(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
     """Add a hinge loss on hinge speeds over their share of the limit."""
-    limit = problem.weights.speed_share * problem.robot.description.max_joint_speed
-    excess = np.sign(velocity) * np.maximum(0.0, np.abs(velocity) - limit)
-    excess[:, :6] = 0.0
+    limit = problem.weights.speed_share * problem.robot.motion_speed_limit
+    hinges, excess = velocity[:, 6:], np.zeros_like(velocity)
+    excess[:, 6:] = np.sign(hinges) * np.maximum(0.0, np.abs(hinges) - limit)
     frame, unknown = np.nonzero(excess)
     if not len(frame):
         return
