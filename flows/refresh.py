@@ -67,6 +67,7 @@ async def refresh(
     overrides: Facts | None = None,
     pipeline: str = "base",
     pipeline_overrides: Facts | None = None,
+    robot: str | None = None,
 ) -> Facts:
     """Search, score, choose, mocap and retarget, for every dance that is due.
 
@@ -76,8 +77,9 @@ async def refresh(
         config: Name or path of the configuration of the search.
         overrides: Overrides of that configuration, values by key path.
         pipeline: Name or path of the configuration of the stages after it.
-        pipeline_overrides: Overrides of the pipeline; robot is a name of configs/robots, or the
-            path, where the worker is, of the YAML of your own.
+        pipeline_overrides: Overrides of the pipeline.
+        robot: Name of one of configs/robots; or path, where the worker is, of the YAML of your own;
+            the pipeline's if absent.
     Raises:
         BadConfiguration: two dances of the book have the same letters and digits, or the robot's
             model is not here.
@@ -86,14 +88,16 @@ async def refresh(
     store, began = Store.from_environment(), datetime.now(UTC)
     sweep(store, work=False)
     load(FindConfig, config, overrides)  # before any dance
-    stages = load(PipelineConfig, pipeline, pipeline_overrides)
-    robot = load_robot(describe_robot(stages.robot)).description.name
-    given = (config, overrides or {}, pipeline, pipeline_overrides or {})
+    chosen = {} if robot is None else {"robot": yaml_text(robot)}
+    later = {**(pipeline_overrides or {}), **chosen}
+    stages = load(PipelineConfig, pipeline, later)
+    dancer = load_robot(describe_robot(stages.robot)).description.name
+    given = (config, overrides or {}, pipeline, later)
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
     waiting: list[str] = []
     for dance in _require_distinct(load(DanceBook, book)).pick(dances):
-        if dances is None and not is_due(store, dance, robot, began):
+        if dances is None and not is_due(store, dance, dancer, began):
             waiting.append(dance.name)
             continue
         state = await refresh_dance(dance.name, asdict(dance), *given, return_state=True)
@@ -102,7 +106,7 @@ async def refresh(
             failed[dance.name] = reason_of(result)
         else:
             done[dance.name] = result
-            note(store, dance, robot, began, result)
+            note(store, dance, dancer, began, result)
     candidate_catalogue.compact(store)
     await _log_summary(done, failed)
     if failed and not done:
@@ -120,8 +124,7 @@ def run(
     Raises:
         DeploymentFailed: the Prefect server that is named does not answer, or refuses us.
     """
-    chosen = {} if robot is None else {"robot": yaml_text(robot)}
-    return launch(refresh, dances, BOOK, config, dict(overrides), "base", chosen)
+    return launch(refresh, dances, BOOK, config, dict(overrides), "base", {}, robot)
 
 
 @flow(name="refresh-dance", flow_run_name="{name}", task_runner=HUNTERS)  # type: ignore[arg-type]

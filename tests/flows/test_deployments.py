@@ -79,6 +79,13 @@ def test_dances_are_requested_by_name() -> None:
     assert flow_of(expected).validate_parameters({"source": "APT"})["source"] == "APT"
 
 
+def test_each_deployment_that_moves_a_robot_takes_its_name() -> None:
+    """`find` ranks videos, and studies name their robot; `refresh` had no such parameter."""
+    flows = {flow_of(deployment) for deployment in DEPLOYMENTS}
+    robotless = {f.name for f in flows if "robot" not in inspect.signature(f.fn).parameters}
+    assert robotless == {"find", "ablation", "cell"}
+
+
 def within(**silence: str) -> dict[str, int]:
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv(SILENCE, raising=False)

@@ -297,8 +297,15 @@ def test_a_refresh_by_hand_is_for_the_robot_that_is_named(
     robot: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[Any] = []
-    monkeypatch.setattr(nightly, "launch", lambda *words: given.extend(words))
-    nightly.run(["APT"], "finding", {}, robot)
+
+    async def refused(*words: Any, return_state: bool) -> Any:
+        given.extend(words)
+        raise SearchFailed("far enough")
+
+    monkeypatch.setattr(nightly, "refresh_dance", refused)
+    monkeypatch.setattr(nightly, "launch", lambda flow, *words: asyncio.run(flow.fn(*words)))
+    with pytest.raises(SearchFailed, match="far enough"):
+        nightly.run(["APT"], "finding", {}, robot)
     pipeline, overrides = given[-2:]
     assert load(PipelineConfig, pipeline, overrides).robot == (robot or PipelineConfig().robot)
 
