@@ -203,7 +203,7 @@ def _read(store: Store, key: str) -> pa.Table | None:
         if store.exists(key):
             raise
         return None
-    return tables.decode_table(CANDIDATE_RECORD, data, store.address(key), earlier=True)
+    return tables.decode_table(CANDIDATE_RECORD, data, store.address(key))
 
 
 def _distinct(table: pa.Table) -> pa.Table:

@@ -143,6 +143,7 @@ def evaluate(
     from robojackson.cli import cards, stages
     from robojackson.cli.learning.training_process import end_with
     from robojackson.cli.passport_text import passport_lines
+    from robojackson.report.closeness import sentences
 
     if parent:
         end_with(parent)
@@ -151,6 +152,7 @@ def evaluate(
     given = {"evaluate.seconds": seconds, "evaluate.passport": passport or None}
     overrides = overrides_from(set_, given)
     evaluated = stages.evaluate(policy, reference, out, config, overrides, robot)
-    lines = [*stages.verdict_lines(evaluated), *passport_lines(evaluated)]
+    closely = sentences(evaluated)
+    lines = [*stages.verdict_lines(evaluated), *closely, *passport_lines(evaluated)]
     table = [*lines, *cards.closing(evaluated)]
     return CommandResult(evaluated, text=cards.shown(evaluated, table, verbose))

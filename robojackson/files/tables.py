@@ -99,7 +99,7 @@ def encode_rows(schema: TableSchema, rows: Iterable[Row]) -> bytes:
 
 
 def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, Any]]:
-    """Return the records of a Parquet file.
+    """Return the records of a Parquet file; nullable columns that it lacks are empty.
 
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
@@ -108,22 +108,19 @@ def decode_rows(schema: TableSchema, data: bytes, where: str) -> list[dict[str, 
     return result
 
 
-def decode_table(
-    schema: TableSchema, data: bytes, where: str, *, earlier: bool = False
-) -> pa.Table:
-    """Return the records of a Parquet file as an Arrow table.
+def decode_table(schema: TableSchema, data: bytes, where: str) -> pa.Table:
+    """Return the records of a Parquet file as an Arrow table; nullable columns that it lacks, since
+    an earlier version wrote it, are empty.
 
-    Args:
-        earlier: Whether an earlier version is accepted: nullable columns that it lacks are empty.
     Raises:
         BadTable: not Parquet, another table, or a column that is wrong.
     """
     found = read_parquet(data, where)
-    if earlier:
-        for field in (c.field() for c in schema.columns if c.nullable):
-            if field.name not in found.column_names:
-                found = found.append_column(field, pa.nulls(found.num_rows, field.type))
-        known = [c.name for c in schema.columns if c.name in found.column_names]
+    for field in (c.field() for c in schema.columns if c.nullable):
+        if field.name not in found.column_names:
+            found = found.append_column(field, pa.nulls(found.num_rows, field.type))
+    known = [c.name for c in schema.columns]
+    if all(found.column_names.count(name) == 1 for name in known):
         found = found.select([*known, *(n for n in found.column_names if n not in known)])
     return check(schema, found, where)
 

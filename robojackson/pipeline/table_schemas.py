@@ -79,6 +79,8 @@ EVALUATION_RECORD = TableSchema(
         Column("heading_error_deg", F64, "deg", nullable=True),
         Column("travel_ratio", F64, "1", nullable=True),
         Column("fell", FLAG),
+        Column("off_sites", FLAG, nullable=True),
+        Column("off_ends", FLAG, nullable=True),
         Column("kneels", FLAG, nullable=True),
         Column("on_floor", FLAG, nullable=True),
         Column("end_height_error_m", F64, "m", nullable=True),

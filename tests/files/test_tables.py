@@ -255,6 +255,15 @@ def test_a_row_with_a_wrong_value_names_its_column() -> None:
         tables.encode_rows(EPISODE_RECORD, [{**EPISODE, "episode_length": "long"}])
 
 
+def test_rows_of_before_a_column_was_added_are_read() -> None:
+    """153 rows of the learning benchmark have no `off_sites`; each user's store has such rows."""
+    whole = pq.read_table(io.BytesIO(tables.encode_rows(EVALUATION_RECORD, [])))
+    sink = io.BytesIO()
+    pq.write_table(whole.drop_columns(["off_sites", "mpjpe_l_m"]), sink)
+    read = tables.decode_table(EVALUATION_RECORD, sink.getvalue(), "f")
+    assert read.column_names == [c.name for c in EVALUATION_RECORD.columns]
+
+
 def test_an_empty_table_has_all_columns() -> None:
     table = pq.read_table(io.BytesIO(tables.encode_rows(EVALUATION_RECORD, [])))
     assert table.column_names == [c.name for c in EVALUATION_RECORD.columns]

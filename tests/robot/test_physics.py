@@ -237,7 +237,7 @@ def test_a_damping_ratio_holds_for_any_stiffness(stiffness: dict[str, float]) ->
 
 
 def test_a_damping_ratio_needs_an_armature() -> None:
-    with pytest.raises(BadConfiguration, match="damping_ratio.*has no armature"):
+    with pytest.raises(BadConfiguration, match=r"damping_ratio.*has no armature"):
         altered(damping={}, armature={"*": 0.0}, damping_ratio={"*": 0.7})
 
 

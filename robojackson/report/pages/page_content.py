@@ -134,7 +134,10 @@ def limb_rows(results: Results) -> list[Verdict]:
             f"{confidence:.2f}",
             f"{directions[limb]:.0f}°",
             "–" if error is None else f"{1000 * float(error.mean()):.0f} mm",
-            format_value("limb_gain", results.evaluation.get(f"limb_gain_{limb}")),
+            *(
+                format_value(figure, results.evaluation.get(f"{figure}_{limb}"))
+                for figure in ("limb_gain", "limb_r2", "excess_speed")
+            ),
         ]
         rows.append(Verdict(limb.replace("_", " "), "", row, False))
     return rows

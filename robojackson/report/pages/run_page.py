@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from robojackson.report.closeness import sentences
 from robojackson.report.pages import inline
 from robojackson.report.pages.evaluation_text import (
     PASSPORT_COLUMNS,
@@ -143,7 +144,7 @@ class _Section:
     lines: Sequence[Quantity]
 
 
-LIMB_COLUMNS = ("limb", "confidence", "direction", "error", "gain")
+LIMB_COLUMNS = ("limb", "confidence", "direction", "error", "gain", "R2", "excess, m/s")
 BEAT_COLUMNS = ("", "beats", "precision", "recall", "F1", "BAS")
 SCRIPTS = ("scene.js", "page.js")
 
@@ -171,6 +172,7 @@ def render(content: PageContent) -> str:
         tiles=tiles(evaluation) + beat_tiles(content.beats),
         columns=[Quantity("", "")] + quantities(dict.fromkeys(VERDICT_COLUMNS)),
         verdicts=verdicts(evaluation),
+        closeness=sentences(evaluation),
         passport_columns=[Quantity("", "")] + quantities(dict.fromkeys(PASSPORT_COLUMNS)),
         passport=passport_rows(evaluation),
         least_kept=format_value("kept", evaluation.get("passport_least_kept")),

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+import mujoco
+
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import EvaluateConfig, RandomConfig
 from robojackson.rl.evaluation.controllers import Evaluated, sees_ahead, trained_driver
@@ -71,12 +73,15 @@ def _bodies() -> Iterator[Case]:
 
 
 def _stepping(robot: Robot) -> Iterator[Case]:
+    """Yield the time steps and integrators that are not the robot's own, which are the nominal."""
     own, control_dt = float(robot.model.opt.timestep), robot.description.control_dt
+    integrates = mujoco.mjtIntegrator(robot.model.opt.integrator).name.removeprefix("mjINT_")
     for timestep in TIMESTEPS_S:
         if substeps_of(control_dt, timestep) is not None and abs(timestep - own) > 1e-9:
             yield Case(f"time step {1e3 * timestep:g} ms", Variation(timestep=timestep))
     for name in INTEGRATORS:
-        yield Case(f"integrator {name}", Variation(integrator=name))  # type: ignore[arg-type]
+        if name.lower() != integrates.lower():
+            yield Case(f"integrator {name}", Variation(integrator=name))  # type: ignore[arg-type]
 
 
 def _signals(robot: Robot, seed: int) -> Iterator[Case]:

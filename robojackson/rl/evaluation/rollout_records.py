@@ -71,6 +71,8 @@ class RolloutScorer:
             "fell": fell,
             "success": float(not fell),
             "strict_success": float(strict),
+            "off_sites": found.sites,
+            "off_ends": found.ends,
             "kneels": found.kneels,
             "on_floor": found.floor,
             "end_height_error_m": found.worst_end_m,

@@ -10,6 +10,14 @@ from robojackson.robot.model import Robot
 
 MEANT = ("limb_", "excess_", "usage_", "reward_", "return_", "error_")
 """Prefixes of further columns that are averaged over the rollouts."""
+LOST = {
+    "lost_sites": "off_sites",
+    "lost_ends": "off_ends",
+    "lost_kneels": "kneels",
+    "lost_floor": "on_floor",
+}
+"""Counts of the rollouts that broke a strict rule without a fall, and the column that says so; one
+that broke several stands under each."""
 STAND = -1
 """`phase` of the row that starts in the default stand."""
 
@@ -46,6 +54,10 @@ def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     out |= {key: _mean(rows, key) for key in limbs}
     out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
     out["rollouts"] = float(len(rows))
+    fallen = [bool(row["fell"]) for row in rows]
+    out["lost_fell"] = float(sum(fallen))
+    for loss, column in LOST.items():
+        out[loss] = float(sum(bool(r[column]) and not f for r, f in zip(rows, fallen, strict=True)))
     return out
 
 

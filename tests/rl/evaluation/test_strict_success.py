@@ -9,6 +9,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.rollout_records import RolloutScorer
 from robojackson.rl.evaluation.rollouts import Driver, Rollouts, Starts, roll_out
+from robojackson.rl.evaluation.starts import LOST, summarise
 from robojackson.rl.evaluation.strict_success import StrictEvaluator
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.robot.description import FallRule, StrictRule
@@ -76,6 +77,25 @@ def test_a_hand_may_be_25_cm_too_high(
     found = findings(reference_rules, sway, dataclasses.replace(done, points=points))
     assert found.ends is broken
     assert found.worst_end_m == pytest.approx(lift)
+
+
+def test_a_summary_counts_the_rollouts_that_each_rule_lost(
+    reference_rules: Robot, sway: ReferenceMotion
+) -> None:
+    done = perfect(sway)
+    points = done.points.copy()
+    points[40, 0, reference_rules.keypoint_names.index("left_hand"), 2] += 0.3
+    scorer = RolloutScorer(reference_rules, sway, EvaluateConfig())
+    far = dataclasses.replace(done, points=points)
+    fell = dataclasses.replace(lying(done, 60), fell=np.array([True]))
+    made = {"far": far, "lies": lying(done, 60), "fell": fell, "perfect": done}
+    rows = [scorer.row(name, (0, 0), rollouts, 0) for name, rollouts in made.items()]
+    found = summarise(rows)
+    lost = {key: found[key] for key in ("lost_fell", *LOST)}
+    assert lost == {
+        "lost_fell": 1.0, "lost_sites": 0.0, "lost_ends": 1.0, "lost_kneels": 0.0,
+        "lost_floor": 1.0,
+    }  # fmt: skip
 
 
 def test_a_robot_that_fell_is_counted_to_the_horizon(
