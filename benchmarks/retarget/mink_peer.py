@@ -112,6 +112,6 @@ def _held_at(
 
 def _bound(limit, robot: Robot, before: np.ndarray, dt: float) -> None:  # type: ignore[no-untyped-def]
     """Keep hinges within their limits and within the reach of their speed limit."""
-    reach = robot.motion_speed_limit * dt
+    reach = robot.actuation.motion_speed * dt
     limit.lower[7:] = np.maximum(robot.lower, before[7:] - reach)
     limit.upper[7:] = np.minimum(robot.upper, before[7:] + reach)

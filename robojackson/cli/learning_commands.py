@@ -143,7 +143,7 @@ def evaluate(
     from robojackson.cli import cards, stages
     from robojackson.cli.learning.training_process import end_with
     from robojackson.cli.passport_text import passport_lines
-    from robojackson.report.closeness import sentences
+    from robojackson.report.pages.closeness import sentences
 
     if parent:
         end_with(parent)

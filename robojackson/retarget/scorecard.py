@@ -98,7 +98,7 @@ def _validity(motion: ReferenceMotion, robot: Robot) -> dict[str, float]:
         ),
         "quat_error": float(np.abs(np.linalg.norm(motion.qpos[:, 3:7], axis=1) - 1).max()),
         "joint_speed_max_rad_s": float(speeds.max()),
-        "speed_over_limit": float((speeds / robot.motion_speed_limit).max()),
+        "speed_over_limit": float((speeds / robot.actuation.motion_speed).max()),
         "hinge_jerk_rms_rad_s3": retarget_error.hinge_jerk_rms(hinges, motion.dt),
     }
 

@@ -193,7 +193,7 @@ def faults(problem: Problem, qpos: Float[np.ndarray, "T nq"], config: RetargetCo
         acceleration_m_s2=found,
         jumps=found > max(config.jump_bar_m_s2, _OWN_ACCELERATION * required),
         deep=deepest > config.depth_bar_m,
-        fast=bool((speeds > problem.robot.motion_speed_limit).any()),
+        fast=bool((speeds > problem.robot.actuation.motion_speed).any()),
         slips=slip > config.slip_bar_m_s or fast_slip > _FAST_SLIP * config.slip_bar_m_s,
     )
 

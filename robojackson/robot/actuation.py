@@ -28,7 +28,9 @@ class Actuation:
 
     Attributes:
         torque_limit: Nm; infinite without a motor.
-        speed_limit: rad/s.
+        speed_limit: Of the motors, rad/s.
+        motion_speed: Largest speed in a reference motion, rad/s: the description's limit for all
+            hinges, or that of its own motor where that is lower.
         stiffness: Proportional gain, Nm/rad; infinite without a motor.
         damping: Derivative gain, Nm s/rad.
         action_scale: How far a full action moves a hinge's target, rad.
@@ -36,6 +38,7 @@ class Actuation:
 
     torque_limit: Float[np.ndarray, " J"]
     speed_limit: Float[np.ndarray, " J"]
+    motion_speed: Float[np.ndarray, " J"]
     stiffness: Float[np.ndarray, " J"]
     damping: Float[np.ndarray, " J"]
     action_scale: Float[np.ndarray, " J"]
@@ -83,7 +86,8 @@ def actuation_of(
     speed = named("speed_limits")
     return Actuation(
         torque_limit=limit,
-        speed_limit=np.where(np.isnan(speed), description.max_joint_speed, speed),
+        speed_limit=_first(speed, np.full(len(joints), description.max_joint_speed)),
+        motion_speed=np.fmin(speed, description.max_joint_speed),
         stiffness=stiffness,
         damping=damping,
         action_scale=np.where(np.isnan(scale), ACTION_SCALE_RAD, scale),

@@ -117,15 +117,6 @@ class Robot:
         return result
 
     @cached_property
-    def motion_speed_limit(self) -> Float[np.ndarray, " J"]:
-        """Largest speed of a hinge in a reference motion, rad/s: the description's limit for all,
-        or that of its own motor where that is lower."""
-        result: np.ndarray = np.minimum(
-            self.description.max_joint_speed, self.actuation.speed_limit
-        )
-        return result
-
-    @cached_property
     def foot_bodies(self) -> Int[np.ndarray, " F"]:
         """The bodies of the contact balls and those that are welded to them."""
         found = set(self.contact_bodies.tolist())

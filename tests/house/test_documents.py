@@ -1,10 +1,11 @@
 """What the documents name is there."""
 
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from tests.fixtures import checkout
 
 ROOT = Path(__file__).parents[2]
 RECIPES = (ROOT / "docs" / "recipes.md").read_text()
@@ -54,10 +55,8 @@ def test_the_new_names_of_modules_are_those_of_files() -> None:
 
 
 def documents() -> list[Path]:
-    """Return the Markdown files of the repository: what git has or would take."""
-    words = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md")
-    names = subprocess.run(words, cwd=ROOT, capture_output=True, check=True).stdout.decode()
-    return [path for name in filter(None, names.split("\0")) if (path := ROOT / name).is_file()]
+    """Return the Markdown files of the repository."""
+    return [ROOT / name for name in checkout.files() if name.endswith(".md")]
 
 
 def links(text: str) -> list[str]:
@@ -95,3 +94,11 @@ def test_the_new_names_of_functions_are_those_of_the_code() -> None:
     text = {module: file.read_text(encoding="utf-8") for module, file in files.items()}
     lost = [f"{m}: {n}" for m, n in rows if not re.search(rf"\b{n.split('.')[-1]}\b", text[m])]
     assert lost == []
+
+
+def test_a_copy_without_git_has_the_same_files(tmp_path: Path) -> None:
+    """README's second command failed in a ZIP or tarball of the repository."""
+    for name in ("README.md", "docs/a.md", ".ci/run", "store/x.md", ".venv/y.md", "a.egg-info/z"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    assert checkout.files(tmp_path) == [".ci/run", "README.md", "docs/a.md"]

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.fixtures import checkout
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -50,12 +52,10 @@ class Installed:
 
 
 def build(folder: Path) -> Path:
-    """Build the wheel from a copy of what git would have."""
-    listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-    names = subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode()
+    """Build the wheel from a copy of the repository's files."""
     copy = folder / "checkout"
-    for name in filter(None, names.split("\0")):
-        if (ROOT / name).is_file() and not name.startswith(("tests/", "docs/", "benchmarks/")):
+    for name in checkout.files():
+        if not name.startswith(("tests/", "docs/", "benchmarks/")):
             (copy / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, copy / name)
     words = ("-m", "build", "--wheel", "--no-isolation", "--outdir", folder / "dist", copy)

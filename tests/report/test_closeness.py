@@ -1,6 +1,6 @@
 """Sentences of what strict success lost and of how closely a robot follows."""
 
-from robojackson.report.closeness import sentences
+from robojackson.report.pages.closeness import sentences
 
 CLOSE = {
     "success": 0.96, "rollouts": 73.0, "lost_fell": 3.0, "lost_sites": 0.0, "lost_ends": 2.0,

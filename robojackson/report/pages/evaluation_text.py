@@ -16,6 +16,8 @@ VERDICT_COLUMNS = (
     "survived_s", "success", "strict_success", "skill", "site_error_m", "limb_gain", "drift_m",
     "heading_error_deg",
 )  # fmt: skip
+RESPONSES = ("limb_gain", "limb_r2", "excess_speed")
+"""Figures of each limb."""
 NOT_TRAINED = "follows any motion, not trained on this one"
 """Description of a tracker."""
 TOO_SHORT = "too short"

@@ -13,7 +13,7 @@ from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
-from robojackson.report.pages.evaluation_text import Verdict, dancer_of, next_step
+from robojackson.report.pages.evaluation_text import RESPONSES, Verdict, dancer_of, next_step
 from robojackson.report.pages.run_page import PageCandidate, PageContent, Plot
 from robojackson.report.plots import run_plots
 from robojackson.report.plots.feasibility_plot import feasibility_strip
@@ -134,10 +134,7 @@ def limb_rows(results: Results) -> list[Verdict]:
             f"{confidence:.2f}",
             f"{directions[limb]:.0f}°",
             "–" if error is None else f"{1000 * float(error.mean()):.0f} mm",
-            *(
-                format_value(figure, results.evaluation.get(f"{figure}_{limb}"))
-                for figure in ("limb_gain", "limb_r2", "excess_speed")
-            ),
+            *(format_value(key, results.evaluation.get(f"{key}_{limb}")) for key in RESPONSES),
         ]
         rows.append(Verdict(limb.replace("_", " "), "", row, False))
     return rows

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robojackson.report.closeness import sentences
 from robojackson.report.pages import inline
+from robojackson.report.pages.closeness import sentences
 from robojackson.report.pages.evaluation_text import (
     PASSPORT_COLUMNS,
     VERDICT_COLUMNS,

@@ -106,7 +106,7 @@ def _add_differences(
 
 def _speed(problem: Problem, velocity: np.ndarray, out: Normal) -> None:
     """Add a hinge loss on hinge speeds over their share of the limit."""
-    limit = problem.weights.speed_share * problem.robot.motion_speed_limit
+    limit = problem.weights.speed_share * problem.robot.actuation.motion_speed
     hinges, excess = velocity[:, 6:], np.zeros_like(velocity)
     excess[:, 6:] = np.sign(hinges) * np.maximum(0.0, np.abs(hinges) - limit)
     frame, unknown = np.nonzero(excess)

@@ -3,9 +3,7 @@
 Every figure is a key of evaluation.json (`rl.evaluation.starts.summarise`).
 """
 
-from collections.abc import Mapping
-from typing import Any
-
+from robojackson.report.pages.evaluation_text import Evaluation
 from robojackson.report.quantities import format_value
 from robojackson.robot.names import FEET, HANDS
 
@@ -19,7 +17,7 @@ LOSSES = {
 """Count of rollouts in evaluation.json, and what they did."""
 
 
-def sentences(evaluation: Mapping[str, Any]) -> list[str]:
+def sentences(evaluation: Evaluation) -> list[str]:
     """Return what cost strict success, then position errors, then feet and hands; nothing where
     the evaluation is too short or of before these figures."""
     if evaluation.get("success") is None:
@@ -27,7 +25,7 @@ def sentences(evaluation: Mapping[str, Any]) -> list[str]:
     return [line for line in (_losses(evaluation), _errors(evaluation), _ends(evaluation)) if line]
 
 
-def _losses(evaluation: Mapping[str, Any]) -> str:
+def _losses(evaluation: Evaluation) -> str:
     """Return how many rollouts broke which rule; those that fell stand under that alone."""
     if "lost_fell" not in evaluation:
         return ""
@@ -39,7 +37,7 @@ def _losses(evaluation: Mapping[str, Any]) -> str:
     return f"Not strict, of {every} rollouts: {found}."
 
 
-def _errors(evaluation: Mapping[str, Any]) -> str:
+def _errors(evaluation: Evaluation) -> str:
     figures = {key: evaluation.get(key) for key in ("mpjpe_l_alive_m", "mpjpe_g_alive_m")}
     if any(value is None for value in figures.values()):
         return ""
@@ -53,7 +51,7 @@ def _errors(evaluation: Mapping[str, Any]) -> str:
     )
 
 
-def _ends(evaluation: Mapping[str, Any]) -> str:
+def _ends(evaluation: Evaluation) -> str:
     """Return gain, R2 and excess speed of feet and hands; dashes where a limb hardly moves."""
     limbs = [limb for limb in (*FEET, *HANDS) if f"excess_speed_{limb}" in evaluation]
     if not limbs:
