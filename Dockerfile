@@ -22,7 +22,7 @@ RUN mkdir -p ~/.cache/robojackson
 # What is installed depends on these files alone: a changed module does not install it again.
 ARG TORCH_INDEX=""
 COPY --chown=jackson:jackson pyproject.toml constraints.txt ./
-RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=app,fast,s3 sh tools/bootstrap.sh dependencies
+RUN TORCH_INDEX="$TORCH_INDEX" EXTRAS=app,fast,s3,trackers sh tools/bootstrap.sh dependencies
 COPY --chown=jackson:jackson . .
 RUN .venv/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --editable .
 

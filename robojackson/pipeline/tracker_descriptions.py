@@ -3,7 +3,7 @@
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.pipeline.configuration_files import names
 from robojackson.pipeline.yaml_loader import load
-from robojackson.rl.trackers.onnx_network import require_runtime
+from robojackson.rl.trackers.onnx_network import has_runtime, require_runtime
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.tracker_file import is_present, require_file
 
@@ -48,12 +48,17 @@ def default_trackers(robot: str) -> list[TrackerDescription]:
     return [each for each in trackers_of(robot) if each.by_default]
 
 
+def needs_runtime(tracker: TrackerDescription) -> bool:
+    """Return whether onnxruntime runs its network."""
+    return tracker.network == "twist2"
+
+
 def require_tracker(robot: str, name: str | None = None) -> TrackerDescription | None:
     """Return a tracker of a robot that can be run at once.
 
     Args:
-        name: Name of the tracker; when None, the first that is here, a fallback last; no tracker
-            when `none`.
+        name: Name of the tracker; when None, the first that is here and can be run, a fallback
+            last; no tracker when `none`.
 
     Raises:
         UnknownName: there is no such tracker.
@@ -71,9 +76,11 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
             "robot, as --robot g1"
         )
     here = [each for each in known if is_present(each)] or known
+    if name is None:
+        here = [each for each in here if has_runtime() or not needs_runtime(each)] or here
     chosen = min(here, key=lambda each: each.fallback)
     if chosen.robot != robot:
         raise BadPolicy(f"tracker {name!r} drives robot {chosen.robot!r}, not {robot!r}")
-    if require_file(chosen) is not None and chosen.network == "twist2":
+    if require_file(chosen) is not None and needs_runtime(chosen):
         require_runtime()
     return chosen

@@ -115,6 +115,7 @@ def main() -> None:
     folders = Folders.at(folder)
     rows = polish_rows(folders)
     held = {"command": "python -m benchmarks.learning.rows.polish_rows", "rows": rows}
+    folders.results.mkdir(parents=True, exist_ok=True)
     (folders.results / "learning_polish.json").write_text(json.dumps(held, indent=1) + "\n")
     table = polish_table(rows)
     if folder is None:

@@ -8,7 +8,8 @@ from robojackson.files.file_tree import FileTree, in_one_line
 from robojackson.files.local_folder import sha256_of_file
 from robojackson.files.store_files import copy_file_here, is_whole, share_file
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
-from robojackson.pipeline.tracker_descriptions import describe_tracker, tracker_names
+from robojackson.pipeline.tracker_descriptions import describe_tracker, needs_runtime, tracker_names
+from robojackson.rl.trackers.onnx_network import require_runtime
 from robojackson.rl.trackers.tracker_description import TrackerDescription, TrackerFile
 from robojackson.rl.trackers.tracker_file import (
     is_present,
@@ -54,8 +55,11 @@ def add_tracker(name: str, file: Path | None = None) -> Entry:
         DownloadFailed: the file cannot be downloaded, or the server sends another.
         BadPolicy: the copy is not the expected file.
         StoreError: the store cannot be written.
+        MissingDependency: what runs it is not installed; nothing was downloaded.
     """
     tracker = describe_tracker(name)
+    if needs_runtime(tracker):
+        require_runtime()
     pinned, path, key = tracker.file, tracker_path(tracker), tracker_key(tracker)
     entry = {"tracker": name, "file": str(path or ""), "licence": tracker.licence}
     if pinned is None or pinned.url is None or path is None or key is None:

@@ -52,13 +52,18 @@ class OnnxNetwork:
         return np.asarray(result, float)
 
 
+def has_runtime() -> bool:
+    """Return whether onnxruntime is installed."""
+    return find_spec("onnxruntime") is not None
+
+
 def require_runtime() -> None:
     """Raise an error with the installation command if onnxruntime is missing.
 
     Raises:
         MissingDependency: onnxruntime is not installed.
     """
-    if find_spec("onnxruntime") is None:
+    if not has_runtime():
         raise MissingDependency(f"onnxruntime is not installed: {INSTALL}")
 
 

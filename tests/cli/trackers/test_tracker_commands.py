@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 
 from robojackson.cli.trackers.tracker_files import add_tracker
-from robojackson.errors import BadPolicy, DownloadFailed, StoreError, UnknownName
+from robojackson.errors import BadPolicy, DownloadFailed, MissingDependency, StoreError, UnknownName
+from robojackson.pipeline import tracker_descriptions
+from robojackson.pipeline.tracker_descriptions import describe_tracker, require_tracker
+from robojackson.rl.trackers import onnx_network
 from robojackson.rl.trackers.tracker_file import open_tracker, tracker_path
 from tests.fixtures.commands import Said, in_process
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_network, write_yaml
@@ -58,6 +61,29 @@ def test_the_file_is_downloaded_once_and_can_be_run(pin, web: Web, network: Path
     assert path.read_bytes() == network.read_bytes()
     assert len(web.requests) == 1
     assert names_in(path.parent) == ["network.onnx"]
+
+
+def test_without_what_runs_it_nothing_is_downloaded(
+    pin, web: Web, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file was fetched and shared first; it then was each dance's default, which failed."""
+    path = pin()
+    monkeypatch.setattr(onnx_network, "has_runtime", lambda: False)
+    with pytest.raises(MissingDependency, match=r"pip install 'robojackson\[trackers\]'"):
+        add_tracker(NAME)
+    assert (web.requests, path.exists()) == ([], False)
+
+
+def test_a_network_that_cannot_run_here_is_no_default(pin, monkeypatch) -> None:
+    pin()
+    add_tracker(NAME)
+    both = [describe_tracker(NAME), replace(describe_tracker("regulator"), robot="humanoid")]
+    monkeypatch.setattr(tracker_descriptions, "default_trackers", lambda robot: both)
+    found = []
+    for runs in (True, False):
+        monkeypatch.setattr(tracker_descriptions, "has_runtime", lambda runs=runs: runs)
+        found.append(require_tracker("humanoid"))
+    assert [each and each.name for each in found] == [NAME, "regulator"]
 
 
 def test_a_download_that_was_cut_off_goes_on_where_it_ended(pin, web: Web, network: Path) -> None:
