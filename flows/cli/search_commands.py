@@ -17,7 +17,10 @@ def find(
     query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
     top: Annotated[int | None, typer.Option(min=1, help="How many videos to assess.")] = None,
     source: Annotated[
-        str, typer.Option(help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md).")
+        str,
+        typer.Option(
+            help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md)."
+        ),
     ] = "youtube",
     address: Annotated[
         str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")

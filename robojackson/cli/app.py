@@ -103,10 +103,12 @@ def mocap(
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
     with video_range(video, second, out, (start, end), config, overrides) as shown:
         if people:
-            data, lines = list_people(shown, out, config, overrides)
+            data, lines = list_people(shown, out, config, overrides, start)
             return CommandResult(data, text=lines)
         made = stages.mocap(shown, out, config, overrides, hypotheses, second)
-        made = mocap_card.with_verdict(made | draw_mocap(shown, out, config, overrides, film))
+        made = mocap_card.with_verdict(
+            made | draw_mocap(shown, out, config, overrides, film), start
+        )
     return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))
 
 

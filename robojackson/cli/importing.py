@@ -10,6 +10,7 @@ import numpy as np
 
 from robojackson.api.foreign_files import Up, read_foreign
 from robojackson.cli import cards
+from robojackson.cli.mocap_card import TURNED, floor_figures
 from robojackson.cli.pictures.motion_source import FILE as SOURCE
 from robojackson.cli.pictures.motion_source import import_record
 from robojackson.cli.stages import Overrides
@@ -56,6 +57,11 @@ def import_verdict(figures: Mapping[str, Any]) -> dict[str, str]:
     """Return kind and sentence about an imported motion."""
     seconds, share = figures["frames"] / figures["fps"], figures["contact_share"]
     summary = f"{seconds:.1f} s, with a foot on the floor in {share:.0%} of the frames"
+    off = {"hangs": figures["head_down_share"], "lies": figures["lying_share"]}
+    how = max(off, key=lambda each: off[each])
+    if off[how] > TURNED:
+        sentence = f"The trunk {how} in {off[how]:.0%} of the frames ({summary}): is --up right?"
+        return {"kind": "turned", "sentence": sentence}
     if share < AIRBORNE:
         sentence = f"The person hardly touches the floor ({summary}): is --up right, or --fps?"
         return {"kind": "airborne", "sentence": sentence}
@@ -66,10 +72,12 @@ def import_verdict(figures: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _figures(sequence: SmplSequence) -> dict[str, Any]:
+    floor = floor_figures(sequence)
     return {
         "frames": len(sequence),
         "fps": sequence.fps,
         "lowest_keypoint_m": float(sequence.keypoints_w[..., 2].min()),
+        **{key: floor[key] for key in ("head_down_share", "lying_share")},
         "contact_share": float(np.mean((sequence.contact != 0).any(1))),
         "notes": list(sequence.notes),
     }

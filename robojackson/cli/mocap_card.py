@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from robojackson.cli.cards import Answer, advice_lines, closing
+from robojackson.cli.cards import Answer, advice_lines, closing, later
 from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ SHORTEST_S = 0.25
 """Shortest motion that is retargeted, about; seconds."""
 RISE = 0.5
 """Vertical part of a trunk's direction below which it lies, and hangs below its negative."""
+PARTS = ("weak_s", "filled_s")
+"""Lists of stretches of a clip, seconds."""
 TURNED = 0.5
 """Share of frames in which a person hangs or lies from which the picture may be turned."""
 
@@ -71,12 +73,26 @@ def mocap_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
-def with_verdict(answer: dict[str, object]) -> dict[str, object]:
-    """Return the answer with its verdict; without a next command where that would be refused."""
+def with_verdict(answer: dict[str, object], start_s: float | None = None) -> dict[str, object]:
+    """Return the answer with its verdict; without a next command where that would be refused.
+
+    Args:
+        start_s: Where the clip begins in the video that was given: all moments are of that.
+    """
+    if start_s:
+        answer = _in_the_video(answer, start_s)
     verdict = mocap_verdict(answer)
     if verdict["kind"] == "short":
         answer = {key: value for key, value in answer.items() if key != "next"}
     return answer | {"verdict": verdict}
+
+
+def _in_the_video(answer: Answer, start_s: float) -> dict[str, object]:
+    shifted: dict[str, object] = {"advice": later(answer["advice"], start_s)}
+    if (found := answer.get("reprojection")) is not None:
+        parts = {key: [[start_s + s for s in part] for part in found[key]] for key in PARTS}
+        shifted["reprojection"] = {**found, **parts}
+    return {**answer, **shifted}
 
 
 SOURCES_OF_UP = {

@@ -56,11 +56,28 @@ def write(sequence: SmplSequence) -> bytes:
     root, pelvis = turned_root(sequence, Y_UP_TO_WORLD.T)
     vectors = np.concatenate([root, sequence.body_pose], axis=1).reshape(-1, 3)
     angles = Rotation.from_rotvec(vectors).as_euler(ORDER, degrees=True)
-    angles = angles.reshape(len(sequence), -1, 3)[:, order].reshape(len(sequence), -1)
+    angles = _without_jumps(angles.reshape(len(sequence), -1, 3))
+    angles = angles[:, order].reshape(len(sequence), -1)
     table = np.concatenate([pelvis / CENTIMETRE, angles], axis=1)
     lines += ["MOTION", f"Frames: {len(sequence)}", f"Frame Time: {1.0 / sequence.fps:.10f}"]
     lines += [" ".join(f"{number:.7f}" for number in row) for row in table]
     return ("\n".join(lines) + "\n").encode()
+
+
+def _without_jumps(angles: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T J 3"]:
+    """Return angles of the same rotations, degrees, each the nearest to those of the frame before:
+    programs that resample curves would turn a joint the long way round between two frames.
+
+    Angles (a, b, c) about three different axes and (a + 180, 180 - b, c + 180) are one rotation.
+    """
+    result = np.array(angles)
+    for frame in range(1, len(result)):
+        before = result[frame - 1]
+        same = result[frame], result[frame] * [1, -1, 1] + 180.0
+        near = np.stack([each - 360.0 * np.round((each - before) / 360.0) for each in same])
+        best = np.abs(near - before).sum(-1).argmin(0)
+        result[frame] = near[best, np.arange(near.shape[1])]
+    return result
 
 
 def _branch(index: int, rest: np.ndarray, depth: int, lines: list[str], order: list[int]) -> None:

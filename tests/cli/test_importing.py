@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.api.foreign_files import Up
 from robojackson.body.skeleton import keypoint
 from robojackson.cli.exporting import export
 from robojackson.cli.importing import import_motion, import_verdict
@@ -54,13 +55,28 @@ def test_a_motion_goes_out_and_comes_back(to: str, smpl: Path, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("frames", "share", "kind"), [(90, 0.9, "whole"), (90, 0.1, "airborne"), (30, 0.9, "too_short")]
+    ("frames", "share", "lying", "kind"),
+    [
+        (90, 0.9, 0.1, "whole"),
+        (90, 0.9, 0.6, "turned"),
+        (90, 0.1, 0.0, "airborne"),
+        (30, 0.9, 0.0, "too_short"),
+    ],
 )
 def test_an_import_is_rated_by_its_feet_and_its_length(
-    frames: int, share: float, kind: str
+    frames: int, share: float, lying: float, kind: str
 ) -> None:
-    result = import_verdict({"frames": frames, "fps": 30.0, "contact_share": share})
-    assert result["kind"] == kind
+    figures = {"frames": frames, "fps": 30.0, "contact_share": share, "lying_share": lying}
+    assert import_verdict(figures | {"head_down_share": 0.0})["kind"] == kind
+
+
+@pytest.mark.parametrize(("to", "up"), [("bvh", "z"), ("amass", "y")])
+def test_wrong_axes_are_doubted(to: str, up: Up, smpl: Path, tmp_path: Path) -> None:
+    """A person who lies by wrong axes "stands on the floor", since some point always does."""
+    export(smpl, to, tmp_path / "motion")
+    result = import_motion(tmp_path / "motion", tmp_path / "back", None, up, "base", {})
+    assert result["verdict"]["kind"] == "turned"
+    assert "is --up right?" in result["verdict"]["sentence"]
 
 
 @pytest.mark.medium

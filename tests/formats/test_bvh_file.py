@@ -1,16 +1,19 @@
 """BVH: an independent reader sees the same joints; skeletons of others are understood."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pybvh
 import pytest
+from scipy.spatial.transform import Rotation
 
 from robojackson.body.skeleton import JOINT_NAMES, keypoint
 from robojackson.errors import BadTable
 from robojackson.formats import bvh
 from robojackson.formats.containers import bvh_tree
+from robojackson.formats.foreign_motion import Y_UP_TO_WORLD
 from robojackson.mocap.imported_motion import ground_foreign_motion
 from tests.fixtures.person import person
 
@@ -27,6 +30,25 @@ def test_an_independent_reader_sees_the_same_joints(tmp_path: Path) -> None:
     in_our_world = places[..., [2, 0, 1]]
     np.testing.assert_allclose(in_our_world, sequence.joints, atol=1e-5)
     assert other.fps == pytest.approx(sequence.fps, abs=1e-3)
+
+
+def test_no_joint_turns_the_long_way_round_between_two_frames() -> None:
+    """Curves of 30 frames a second that a program resamples to 24 span the jumps of Euler angles."""
+    sequence = person()
+    count = len(sequence)
+    turns = Rotation.from_euler("z", np.linspace(0.0, 400.0, count)[:, None], degrees=True)
+    swing = 100.0 * np.sin(np.linspace(0.0, 6.0, count))[:, None]
+    nod = Rotation.from_euler("y", swing, degrees=True)
+    spun = (turns * nod).as_rotvec()
+    moved = replace(sequence, global_orient=spun)
+    text = bvh.write(moved).decode()
+    rows = text.split("Frame Time:")[1].splitlines()[1:]
+    table = np.array([line.split() for line in rows], float)
+    angles = table[:, 3:]
+    assert np.abs(np.diff(angles, axis=0)).max() < 180.0
+    root = Rotation.from_euler("ZXY", angles[:, :3], degrees=True)
+    turned = Rotation.from_matrix(Y_UP_TO_WORLD) * root
+    assert (turned * Rotation.from_rotvec(spun).inv()).magnitude().max() < 1e-5
 
 
 STICK = """HIERARCHY

@@ -13,10 +13,16 @@ PICTURE = "people.png"
 
 
 def list_people(
-    video: Path, out: Path, config: str, overrides: Mapping[str, object]
+    video: Path,
+    out: Path,
+    config: str,
+    overrides: Mapping[str, object],
+    start_s: float | None = None,
 ) -> tuple[dict[str, object], list[str]]:
     """Return all people in a video, as data and as lines; `--person N` selects one of them.
 
+    Args:
+        start_s: Where the clip begins in the video that was given: all moments are of that.
     Raises:
         NoPersonFound: no person is visible for long enough.
     """
@@ -37,7 +43,7 @@ def list_people(
         if not cast.rows:
             raise NoPersonFound(f"{cast}", video)
         files.write(PICTURE, draw_people(video, cast))
-    people, picture = cast.people, str(out / PICTURE)
+    people, picture = [each.later(start_s or 0.0) for each in cast.people], str(out / PICTURE)
     rows = [asdict(person) for person in people]
     answer: dict[str, object] = {"video": str(video), "people": rows, "picture": picture}
     return answer, [*(f"person {person}" for person in people), f"picture  {picture}"]

@@ -1,7 +1,7 @@
 """All people of a clip: how large, where and when; number 1 is the largest steady person."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,10 @@ class Person:
     from_s: float
     to_s: float
     place: float
+
+    def later(self, begin_s: float) -> "Person":
+        """Return the same of a video of which the clip is the part from a moment on, seconds."""
+        return replace(self, from_s=begin_s + self.from_s, to_s=begin_s + self.to_s)
 
     def __str__(self) -> str:
         side = "left" if self.place < LEFT else "right" if self.place > RIGHT else "middle"

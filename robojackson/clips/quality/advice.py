@@ -5,7 +5,7 @@ advice is given by `mocap`, by `dance` and by the page of a run.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -60,6 +60,13 @@ class Advice:
 
     def __str__(self) -> str:
         return _WORDS[self.kind](self)
+
+    def later(self, begin_s: float) -> "Advice":
+        """Return the same about a video of which the clip is the part from a moment on, seconds."""
+        if self.range_s is None:
+            return self
+        first, last = self.range_s
+        return replace(self, range_s=(begin_s + first, begin_s + last))
 
     @property
     def record(self) -> dict[str, object]:

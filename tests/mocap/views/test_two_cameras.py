@@ -226,6 +226,16 @@ def test_clips_of_different_motions_are_refused(
 
 
 @pytest.mark.medium
+def test_a_second_clip_of_two_frames_is_refused(
+    dancer: np.ndarray, hip_shake: LandmarkTrack
+) -> None:
+    """At 60 frames a second they are shorter than a step of the common clock."""
+    short = filmed(second_frame(dancer)[:2], replace(hip_shake, fps=60.0))
+    with pytest.raises(ViewsDisagree, match="of one person in common"):
+        recover_together(filmed(dancer, hip_shake), short, MocapConfig())
+
+
+@pytest.mark.medium
 def test_two_clips_of_one_camera_are_refused(dancer: np.ndarray, hip_shake: LandmarkTrack) -> None:
     seen = filmed(dancer, hip_shake)
     with pytest.raises(ViewsDisagree, match="from one place"):
