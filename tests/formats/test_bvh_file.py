@@ -33,7 +33,7 @@ def test_an_independent_reader_sees_the_same_joints(tmp_path: Path) -> None:
 
 
 def test_no_joint_turns_the_long_way_round_between_two_frames() -> None:
-    """Curves of 30 frames a second that a program resamples to 24 span the jumps of Euler angles."""
+    """Programs that resample curves interpolate over the jumps of Euler angles."""
     sequence = person()
     count = len(sequence)
     turns = Rotation.from_euler("z", np.linspace(0.0, 400.0, count)[:, None], degrees=True)
