@@ -12,6 +12,12 @@ REASON_LENGTH = 200
 UNRESOLVED = "failed to resolve"
 CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
 """What urllib3 writes before its reason: the host stands in the reason, too."""
+STATUS = re.compile(r"HTTP Error (\d{3})(?:: ([^.;]+))?")
+SHORT = re.compile(r"bytes read|more expected")
+CUT = re.compile(r"Connection (?:broken|aborted)|reset by peer|EOF occurred in violation", re.I)
+UNCONNECTED = re.compile(f"{UNRESOLVED}|failed to establish a new connection", re.I)
+PREFIXES = re.compile(r"^(?:ERROR: )?(?:\[download\] Got error: )?")
+"""What yt-dlp writes before the reason of a download."""
 
 
 class Failure(NamedTuple):
@@ -46,13 +52,27 @@ def explain(failure: BaseException) -> Failure:
         if isinstance(cause, TimeoutError) or "timed out" in str(cause).lower():
             return Failure("the server fell silent", True, 0.0)
         if isinstance(cause, TransportError):
-            line = _line(cause)
-            no_name = isinstance(cause, socket.gaierror) or UNRESOLVED in line.lower()
-            most = 1 if no_name else math.inf
-            return Failure(f"no connection ({CONNECTION.sub('', line)})", True, 0.0, most)
-    text = _line(failure)
-    is_short = "more expected" in text
-    return Failure("the server cut the file short" if is_short else text, is_short, 0.0)
+            return _no_connection(_line(cause), isinstance(cause, socket.gaierror))
+    return _from_text(_line(failure))
+
+
+def _from_text(text: str) -> Failure:
+    """Return what a message means: yt-dlp's downloader reports no cause beside it."""
+    if answer := STATUS.search(text):
+        status = int(answer[1])
+        return Failure(_status(status, clean_text(answer[2] or "", 60)), _is_passing(status), 0.0)
+    if SHORT.search(text):
+        return Failure("the server cut the file short", True, 0.0)
+    if CUT.search(text):
+        return Failure("the server cut the connection", True, 0.0)
+    if UNCONNECTED.search(text):
+        return _no_connection(text)
+    return Failure(text, False, 0.0)
+
+
+def _no_connection(text: str, no_name: bool = False) -> Failure:
+    most = 1 if no_name or UNRESOLVED in text.lower() else math.inf
+    return Failure(f"no connection ({CONNECTION.sub('', text)})", True, 0.0, most)
 
 
 def _causes(failure: BaseException) -> list[BaseException]:
@@ -82,5 +102,5 @@ def _is_passing(status: int) -> bool:
 def _line(error: BaseException) -> str:
     """Return yt-dlp's message without its prefixes and its advice about reporting bugs."""
     text = clean_text(str(error) or type(error).__name__, 10 * REASON_LENGTH)
-    text = text.removeprefix("ERROR: ").split("; please report this issue")[0]
+    text = PREFIXES.sub("", text).split("; please report this issue")[0]
     return clean_text(text.split(" (caused by")[0], REASON_LENGTH)
