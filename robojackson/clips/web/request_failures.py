@@ -18,6 +18,14 @@ CUT = re.compile(r"Connection (?:broken|aborted)|reset by peer|EOF occurred in v
 UNCONNECTED = re.compile(f"{UNRESOLVED}|failed to establish a new connection", re.I)
 PREFIXES = re.compile(r"^(?:ERROR: )?(?:\[download\] Got error: )?")
 """What yt-dlp writes before the reason of a download."""
+PIECE = re.compile(r"fragment \d+ not found")
+"""What it writes where a piece of a stream was empty, or larger than a whole file may be."""
+NO_FORMAT = "Requested format is not available"
+EXTERNAL = re.compile(r"(?:ffmpeg|rtmpdump).*install", re.I)
+ONLY_EXTERNAL = (
+    "only an external program (FFmpeg) could read this stream, such as one of unknown encryption, "
+    "and none is started; choose another video, or use a file of this one"
+)
 
 
 class Failure(NamedTuple):
@@ -57,17 +65,25 @@ def explain(failure: BaseException) -> Failure:
 
 
 def _from_text(text: str) -> Failure:
-    """Return what a message means: yt-dlp's downloader reports no cause beside it."""
+    """Return what a message means: yt-dlp's downloader reports no cause beside it.
+
+    A status below 500 comes with its cause, except that of a piece of a stream.
+    """
     if answer := STATUS.search(text):
         status = int(answer[1])
-        return Failure(_status(status, clean_text(answer[2] or "", 60)), _is_passing(status), 0.0)
+        passing, line = _is_passing(status), _status(status, clean_text(answer[2] or "", 60))
+        return Failure(line if passing else f"a piece of the video: {line}", passing, 0.0)
     if SHORT.search(text):
         return Failure("the server cut the file short", True, 0.0)
     if CUT.search(text):
         return Failure("the server cut the connection", True, 0.0)
     if UNCONNECTED.search(text):
         return _no_connection(text)
-    return Failure(text, False, 0.0)
+    if PIECE.search(text):
+        return Failure("a piece of the video is empty or too large", False, 0.0)
+    if NO_FORMAT in text:
+        return Failure("no format with a picture that can be downloaded", False, 0.0)
+    return Failure(ONLY_EXTERNAL if EXTERNAL.search(text) else text, False, 0.0)
 
 
 def _no_connection(text: str, no_name: bool = False) -> Failure:

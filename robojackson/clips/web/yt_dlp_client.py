@@ -17,9 +17,9 @@ from pydantic import Field
 
 from robojackson.clips.web.address_guard import public_only, refusal
 from robojackson.clips.web.download_formats import FormatConfig, Purpose, choose
-from robojackson.clips.web.javascript_runtimes import runtimes
-from robojackson.clips.web.request_failures import REASON_LENGTH, explain
+from robojackson.clips.web.request_failures import explain
 from robojackson.clips.web.untrusted_text import clean_text, safe_name
+from robojackson.clips.web.yt_dlp_options import fixed_options, hide_ffmpeg
 from robojackson.config import config_dataclass
 from robojackson.errors import DownloadFailed, SearchFailed
 
@@ -138,26 +138,9 @@ def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _options(config: WebConfig) -> dict[str, Any]:
-    import imageio_ffmpeg
-
-    options: dict[str, Any] = {
-        "quiet": True,
-        "noprogress": True,
-        "no_warnings": False,
-        "logger": _Log(),
-        "cachedir": False,
-        "color": {"stdout": "never", "stderr": "never"},
-        "noplaylist": True,
-        "http_headers": {"Accept-Encoding": "identity"},
-        "hls_prefer_native": True,
+    options = fixed_options() | {
         "socket_timeout": config.timeout_s,
         "sleep_interval_requests": config.request_pause_s,
-        "retries": 0,
-        "extractor_retries": 0,
-        "fragment_retries": config.retries,
-        "continuedl": True,
-        "ffmpeg_location": imageio_ffmpeg.get_ffmpeg_exe(),
-        "js_runtimes": {name: {"path": place} for name, place in runtimes().items()},
     }
     if config.proxy:
         options["proxy"] = config.proxy
@@ -181,6 +164,7 @@ def _extract(address: str, options: dict[str, Any]) -> dict[str, Any]:
 def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
     from yt_dlp import YoutubeDL
 
+    hide_ffmpeg()
     with YoutubeDL(options) as ydl:
         ydl.process_ie_result(dict(info), download=True)
 
@@ -233,18 +217,3 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
             log.info("%s; retrying in %.3g s", reason, wait_s)
             time.sleep(wait_s)
     raise AssertionError("unreachable")
-
-
-class _Log:
-    """yt-dlp's messages in our log, one clean line each."""
-
-    def debug(self, message: str) -> None:
-        log.debug("%s", clean_text(message, REASON_LENGTH))
-
-    info = debug
-
-    def warning(self, message: str) -> None:
-        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))
-
-    def error(self, message: str) -> None:
-        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))

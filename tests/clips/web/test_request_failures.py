@@ -25,7 +25,11 @@ FAULTS = {
 """Kinds of answers of the server, and the reason of each."""
 TEXTS = {
     "HTTP Error 502: Bad Gateway": ("HTTP 502 Bad Gateway", True, math.inf),
-    "HTTP Error 404: Not Found. Giving up after 2 retries": ("HTTP 404 not found", False, math.inf),
+    "HTTP Error 404: Not Found. Giving up after 2 retries": (
+        "a piece of the video: HTTP 404 not found",
+        False,
+        math.inf,
+    ),
     "[SSL: UNEXPECTED_EOF_WHILE_READING] EOF occurred in violation of protocol (_ssl.c:1006)": (
         "the server cut the connection",
         True,
