@@ -45,6 +45,11 @@ TEXTS = {
         True,
         1,
     ),
+    "fragment 2 not found, unable to continue": (
+        "a piece of the video is empty or too large",
+        False,
+        math.inf,
+    ),
     "unable to open for writing: no space": (
         "unable to open for writing: no space",
         False,

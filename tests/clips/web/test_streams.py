@@ -1,6 +1,7 @@
 """Streams of pieces (HLS): whole or not at all, and no external program."""
 
 import io
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -80,6 +81,15 @@ def test_a_piece_that_failed_once_is_made_again(streaming: Web, fault: str, tmp_
     streaming.faults = ["hls", "piece", fault]
     assert fetch(chosen, tmp_path, PATIENT).read_bytes() == b"".join(streaming.pieces)
     assert streaming.times("/piece/0.ts") == 1
+
+
+def test_a_stream_beyond_the_limit_is_not_downloaded(streaming: Web, tmp_path: Path) -> None:
+    """Each piece is smaller than the limit, two of them are not."""
+    largest = 1.5 * max(len(piece) for piece in streaming.pieces) / 1e6
+    chosen = offer(f"{streaming.url}/hls/clip.m3u8", "score", FormatConfig(), PATIENT)
+    with pytest.raises(DownloadFailed, match=r"^larger than 0\.0\d* MB$"):
+        fetch(chosen, tmp_path, replace(PATIENT, largest_file_mb=largest))
+    assert streaming.times("/piece/2.ts") == 0
 
 
 def test_a_stream_for_an_external_program_is_refused_in_a_plain_line(
