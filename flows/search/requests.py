@@ -10,6 +10,7 @@ from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
 from robojackson.clips.sources import folder, is_local, page_of, urls
 from robojackson.clips.sources import source as source_of
+from robojackson.clips.web.cookie_file import require_cookies
 from robojackson.clips.web.reachability import require_reachable
 from robojackson.clips.web.untrusted_text import clean_text, web_address
 from robojackson.errors import SearchFailed
@@ -50,7 +51,10 @@ def require_online(dance: Dance, config: FindConfig) -> None:
 
     Raises:
         SearchFailed: one line with the reason and what to do.
+        BadConfiguration: the cookie file cannot be read.
     """
+    if dance.source != folder.NAME:
+        require_cookies(config.web.cookies_file)
     page = page_of(dance.source, dance.full_query, dance.address)
     if dance.source == "site" and not page:
         raise SearchFailed("site: no address; give one such as https://host/search?q={query}")
@@ -63,7 +67,7 @@ def require_findable(words: str, store: Store) -> None:
     or a video that is given by its address can neither be reached nor was downloaded before.
 
     Raises:
-        SearchFailed: as `require_online`.
+        SearchFailed, BadConfiguration: as `require_online`.
     """
     settings = load(FindConfig, "finding")
     if address := web_address(words):
@@ -79,6 +83,7 @@ def require_findable(words: str, store: Store) -> None:
 
 def _require_video(address: str, settings: FindConfig, store: Store) -> None:
     """Raise where a video can neither be reached nor was downloaded before."""
+    require_cookies(settings.web.cookies_file)
     try:
         require_reachable(address, settings.web.proxy)
     except SearchFailed:
@@ -98,7 +103,7 @@ def check_refresh(
     Raises:
         UnknownName, BadConfiguration: a dance, the configuration or the robot cannot be used.
     """
-    load(FindConfig, config, overrides)
+    require_cookies(load(FindConfig, config, overrides).web.cookies_file)
     load(DanceBook, "dances").pick(dances)
     if robot is not None:
         load_robot(describe_robot(robot))

@@ -6,8 +6,10 @@ colon in a name nor a playlist leads it to the network or to another file. Only 
 than `FASTEST` a second, of which about `ANALYSED` are read.
 """
 
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import TypeAlias
 
 import av
 import numpy as np
@@ -17,6 +19,8 @@ from jaxtyping import Float
 
 from robojackson.errors import TruncatedVideo, UnreadableVideo
 from robojackson.files.file_kinds import TABLE, kind_of
+
+Packet: TypeAlias = "av.Packet[VideoStream]"
 
 ISO_MEDIA_MARK = b"ftyp"
 CONTAINERS = (
@@ -34,6 +38,10 @@ LISTS = {
     b"v=0": "a session description (SDP)",
 }
 """Beginnings of what is no video and names other files."""
+TRANSPORT_STREAM = "mpegts"
+"""Container of the pieces of a stream of the web; where two are joined, FFmpeg reports damage."""
+CLOCK_TOLERANCE_S = 0.5
+"""Farther back no clock of a transport stream goes, except where it starts again."""
 MOST_PIXELS = 8192 * 8192
 ASPECTS = 0.25, 4.0
 """Aspects of pixels that are believed."""
@@ -136,13 +144,16 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
 
     Raises:
         TruncatedVideo: the file cannot be read to its end.
+        UnreadableVideo: there are too many frames, or the clock starts again.
     """
     with opened(path) as container:
         stream = video_stream(container, path)
+        joined = container.format.name == TRANSPORT_STREAM
+        packets = container.demux(stream)
         shown = (
             np.nan if packet.pts is None else float(packet.pts * packet.time_base)
-            for packet in container.demux(stream)
-            if packet.size > 0 and not packet.is_discard and not packet.is_corrupt
+            for packet in (_on_one_clock(packets, path) if joined else packets)
+            if packet.size > 0 and not packet.is_discard and (joined or not packet.is_corrupt)
         )
         try:
             found = list(islice(shown, MOST_FRAMES + 1))
@@ -152,6 +163,22 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
         raise UnreadableVideo(f"more than {MOST_FRAMES:,} frames; trim it", path)
     stamps = np.sort(np.array(found))
     return stamps - stamps[:1] if len(stamps) else stamps
+
+
+def _on_one_clock(packets: Iterable[Packet], path: Path) -> Iterator[Packet]:
+    """Yield packets; raise `UnreadableVideo` where their clock starts again."""
+    last_s = -np.inf
+    for packet in packets:
+        if packet.dts is not None:
+            now_s = float(packet.dts * packet.time_base)
+            if now_s < last_s - CLOCK_TOLERANCE_S:
+                raise UnreadableVideo(
+                    f"its clock starts again after {last_s:.1f} s: several videos in one file; "
+                    "write it again (ffmpeg -i IN OUT.mp4)",
+                    path,
+                )
+            last_s = now_s
+        yield packet
 
 
 def declared_rate(stream: VideoStream) -> float:

@@ -1,5 +1,7 @@
 """Frames of containers that say little: their times, and damage at their beginning."""
 
+from fractions import Fraction
+from io import BytesIO
 from pathlib import Path
 
 import av
@@ -69,4 +71,39 @@ def test_a_video_without_a_picture_that_can_be_decoded_is_refused(tmp_path: Path
     whole = written(tmp_path / "whole.mkv", "mjpeg", "yuvj420p", 10)
     path = harmed(whole, tmp_path / "harmed.mkv", set(range(10)))
     with pytest.raises(UnreadableVideo, match="no frame that can be decoded"):
+        probe(path, VideoLimits())
+
+
+def noise_in_pieces(starts: list[int]) -> bytes:
+    """Return joined transport streams of 5 noisy pictures at 5 a second; each knows its start."""
+    rng, joined = np.random.default_rng(0), b""
+    for start in starts:
+        file = BytesIO()
+        with av.open(file, "w", format="mpegts") as container:
+            stream = container.add_stream("libx264", rate=5, options={"tune": "zerolatency"})
+            stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
+            for number in range(5):
+                image = rng.integers(0, 255, (64, 64, 3), dtype=np.uint8)
+                frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+                frame.pts, frame.time_base = start + number, Fraction(1, 5)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        joined += file.getvalue()
+    return joined
+
+
+def test_the_seams_of_a_stream_in_pieces_are_no_damage(tmp_path: Path) -> None:
+    """Each piece counts its packets from 0, which FFmpeg reports as damage."""
+    path = tmp_path / "joined.mp4"
+    path.write_bytes(noise_in_pieces([0, 5, 10]))
+    found = probe(path, VideoLimits())
+    assert (found.frames, found.fps, found.uneven) == (15, pytest.approx(5.0), False)
+    times = [time_s for time_s, _ in timed_frames(path)]
+    np.testing.assert_allclose(times, np.arange(15) / 5, atol=1e-4)
+
+
+def test_a_stream_whose_clock_starts_again_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "joined.mp4"
+    path.write_bytes(noise_in_pieces([0, 5, 0]))
+    with pytest.raises(UnreadableVideo, match=r"starts again after .* several videos"):
         probe(path, VideoLimits())

@@ -7,6 +7,7 @@ connects to is the proxy's matter.
 """
 
 import ipaddress
+import re
 import socket
 import urllib.request
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ WITH_IPV4 = (ipaddress.IPv6Network("64:ff9b::/96"), ipaddress.IPv6Network("::/96
 """Networks whose addresses end with an IPv4 address: NAT64 (RFC 6052), and the earliest form."""
 PORTS = {"http": 80, "https": 443, "socks4": 1080, "socks5": 1080, "socks5h": 1080}
 ADVICE = "web.private_addresses=true in the configuration allows it"
+REFUSED = re.compile(f"\\S{{1,80}} is no address of the public web; {re.escape(ADVICE)}")
+"""The guard's message, also inside a text of a library that does not attach the cause."""
 _trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted hosts of the guard", default=None)
 _resolve = socket.getaddrinfo
 Given = Any
@@ -98,8 +101,8 @@ def refusal(cause: BaseException) -> DownloadFailed | None:
     """Return the error of ours where the guard is behind an error of a library."""
     seen: BaseException | None = cause
     while seen is not None:
-        if isinstance(seen, PrivateAddress):
-            return DownloadFailed(str(seen))
+        if found := REFUSED.search(str(seen)):
+            return DownloadFailed(found[0])
         seen = seen.__cause__ or seen.__context__
     return None
 

@@ -16,6 +16,8 @@ Purpose = Literal["score", "dance"]
 Format = Mapping[str, Any]
 DIRECT_PROTOCOLS = ("http", "https")
 """Protocols that fetch one file, which can be resumed."""
+EXTERNAL_PROTOCOLS = ("rtmp", "rtmpe", "rtmp_ffmpeg")
+"""Protocols for which yt-dlp starts an external program, without our guard and limits."""
 
 
 @config_dataclass
@@ -38,7 +40,7 @@ def choose(formats: Sequence[Format], purpose: Purpose, config: FormatConfig) ->
     largest of at most `dance_short_side`, or the smallest there is. A format whose size is unknown
     (a link to a file) is taken only when there is no other.
     """
-    seen = [f for f in formats if f.get("vcodec") != "none" and not f.get("has_drm")]
+    seen = [f for f in formats if f.get("vcodec") != "none" and not _is_refused(f)]
     sized = [f for f in seen if short_side(f)]
     if not sized:
         return seen[-1] if seen else None
@@ -54,6 +56,10 @@ def short_side(format_: Format) -> int:
     width, height = format_.get("width"), format_.get("height")
     sides = [int(side) for side in (width, height) if side]
     return min(sides) if sides else 0
+
+
+def _is_refused(format_: Format) -> bool:
+    return bool(format_.get("has_drm")) or format_.get("protocol") in EXTERNAL_PROTOCOLS
 
 
 def _cost(format_: Format) -> tuple[int, bool, float]:

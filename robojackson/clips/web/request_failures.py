@@ -12,6 +12,20 @@ REASON_LENGTH = 200
 UNRESOLVED = "failed to resolve"
 CONNECTION = re.compile(r"^HTTPS?Connection\([^)]*\): ")
 """What urllib3 writes before its reason: the host stands in the reason, too."""
+STATUS = re.compile(r"HTTP Error (\d{3})(?:: ([^.;]+))?")
+SHORT = re.compile(r"bytes read|more expected")
+CUT = re.compile(r"Connection (?:broken|aborted)|reset by peer|EOF occurred in violation", re.I)
+UNCONNECTED = re.compile(f"{UNRESOLVED}|failed to establish a new connection", re.I)
+PREFIXES = re.compile(r"^(?:ERROR: )?(?:\[download\] Got error: )?")
+"""What yt-dlp writes before the reason of a download."""
+PIECE = re.compile(r"fragment \d+ not found")
+"""What it writes where a piece of a stream was empty, or larger than a whole file may be."""
+NO_FORMAT = "Requested format is not available"
+EXTERNAL = re.compile(r"(?:ffmpeg|rtmpdump).*install", re.I)
+ONLY_EXTERNAL = (
+    "only an external program (FFmpeg) could read this stream, such as one of unknown encryption, "
+    "and none is started; choose another video, or use a file of this one"
+)
 
 
 class Failure(NamedTuple):
@@ -46,13 +60,35 @@ def explain(failure: BaseException) -> Failure:
         if isinstance(cause, TimeoutError) or "timed out" in str(cause).lower():
             return Failure("the server fell silent", True, 0.0)
         if isinstance(cause, TransportError):
-            line = _line(cause)
-            no_name = isinstance(cause, socket.gaierror) or UNRESOLVED in line.lower()
-            most = 1 if no_name else math.inf
-            return Failure(f"no connection ({CONNECTION.sub('', line)})", True, 0.0, most)
-    text = _line(failure)
-    is_short = "more expected" in text
-    return Failure("the server cut the file short" if is_short else text, is_short, 0.0)
+            return _no_connection(_line(cause), isinstance(cause, socket.gaierror))
+    return _from_text(_line(failure))
+
+
+def _from_text(text: str) -> Failure:
+    """Return what a message means: yt-dlp's downloader reports no cause beside it.
+
+    A status below 500 comes with its cause, except that of a piece of a stream.
+    """
+    if answer := STATUS.search(text):
+        status = int(answer[1])
+        passing, line = _is_passing(status), _status(status, clean_text(answer[2] or "", 60))
+        return Failure(line if passing else f"a piece of the video: {line}", passing, 0.0)
+    if SHORT.search(text):
+        return Failure("the server cut the file short", True, 0.0)
+    if CUT.search(text):
+        return Failure("the server cut the connection", True, 0.0)
+    if UNCONNECTED.search(text):
+        return _no_connection(text)
+    if PIECE.search(text):
+        return Failure("a piece of the video is empty or too large", False, 0.0)
+    if NO_FORMAT in text:
+        return Failure("no format with a picture that can be downloaded", False, 0.0)
+    return Failure(ONLY_EXTERNAL if EXTERNAL.search(text) else text, False, 0.0)
+
+
+def _no_connection(text: str, no_name: bool = False) -> Failure:
+    most = 1 if no_name or UNRESOLVED in text.lower() else math.inf
+    return Failure(f"no connection ({CONNECTION.sub('', text)})", True, 0.0, most)
 
 
 def _causes(failure: BaseException) -> list[BaseException]:
@@ -82,5 +118,5 @@ def _is_passing(status: int) -> bool:
 def _line(error: BaseException) -> str:
     """Return yt-dlp's message without its prefixes and its advice about reporting bugs."""
     text = clean_text(str(error) or type(error).__name__, 10 * REASON_LENGTH)
-    text = text.removeprefix("ERROR: ").split("; please report this issue")[0]
+    text = PREFIXES.sub("", text).split("; please report this issue")[0]
     return clean_text(text.split(" (caused by")[0], REASON_LENGTH)

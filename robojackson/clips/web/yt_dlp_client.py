@@ -16,10 +16,11 @@ from typing import Any, TypeVar
 from pydantic import Field
 
 from robojackson.clips.web.address_guard import public_only, refusal
+from robojackson.clips.web.cookie_file import open_cookies
 from robojackson.clips.web.download_formats import FormatConfig, Purpose, choose
-from robojackson.clips.web.javascript_runtimes import runtimes
-from robojackson.clips.web.request_failures import REASON_LENGTH, explain
+from robojackson.clips.web.request_failures import explain
 from robojackson.clips.web.untrusted_text import clean_text, safe_name
+from robojackson.clips.web.yt_dlp_options import fixed_options, hide_ffmpeg
 from robojackson.config import config_dataclass
 from robojackson.errors import DownloadFailed, SearchFailed
 
@@ -43,7 +44,7 @@ class WebConfig:
         rate_limit_bytes_s: Fastest download, bytes a second; None is no limit.
         request_pause_s: Pause between two requests for pages, seconds.
         largest_file_mb: A file beyond this is not downloaded, megabytes.
-        cookies_file: Netscape cookie file that is passed through.
+        cookies_file: Netscape cookie file whose cookies are sent; it is never written.
         proxy: Address of a proxy that is passed through.
         private_addresses: Whether addresses that are not of the public web may be connected to.
         language: Language of the titles, two letters; empty is the site's own choice.
@@ -82,10 +83,11 @@ def listing(address: str, config: WebConfig) -> dict[str, Any]:
 
     Raises:
         SearchFailed: the message has the address and the reason.
+        BadConfiguration: the cookie file cannot be read.
     """
-    options = _options(config) | {"extract_flat": "in_playlist"}
+    flat = {"extract_flat": "in_playlist"}
     try:
-        return _patiently(lambda: _extract(address, options), config)
+        return _patiently(lambda: _extract(address, _options(config) | flat), config)
     except DownloadFailed as cause:
         raise SearchFailed(f"{clean_text(address)}: {cause}") from cause
 
@@ -95,9 +97,10 @@ def offer(url: str, purpose: Purpose, formats: FormatConfig, config: WebConfig) 
 
     Raises:
         DownloadFailed: there is no video, or the page cannot be read; the message is the reason.
+        BadConfiguration: the cookie file cannot be read.
     """
-    options = _options(config) | {"format": _selector(purpose, formats)}
-    info = _patiently(lambda: _extract(url, options), config)
+    choice = {"format": _selector(purpose, formats)}
+    info = _patiently(lambda: _extract(url, _options(config) | choice), config)
     if info.get("entries") is not None:
         raise DownloadFailed("a page of several videos, not one")
     if info.get("is_live"):
@@ -111,18 +114,19 @@ def fetch(chosen: Offer, folder: Path, config: WebConfig, progress: Progress | N
 
     Raises:
         DownloadFailed: the message is the reason.
+        BadConfiguration: the cookie file cannot be read.
     """
     target = folder / chosen.name
     template = str(target).replace("%", "%%")
     limit = int(config.largest_file_mb * BYTES_A_MEGABYTE)
-    options = _options(config) | {
+    own = {
         "outtmpl": {"default": template},
         "format": str(chosen.info.get("format_id") or "best"),
         "max_filesize": limit,
         "ratelimit": config.rate_limit_bytes_s,
         "progress_hooks": [_watch(progress, config)],
     }
-    _patiently(lambda: _download(chosen.info, options), config)
+    _patiently(lambda: _download(chosen.info, _options(config) | own), config)
     if not target.is_file():
         raise DownloadFailed(f"larger than {config.largest_file_mb:g} MB, or nothing was sent")
     return target
@@ -138,26 +142,10 @@ def entries(info: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _options(config: WebConfig) -> dict[str, Any]:
-    import imageio_ffmpeg
-
-    options: dict[str, Any] = {
-        "quiet": True,
-        "noprogress": True,
-        "no_warnings": False,
-        "logger": _Log(),
-        "cachedir": False,
-        "color": {"stdout": "never", "stderr": "never"},
-        "noplaylist": True,
-        "http_headers": {"Accept-Encoding": "identity"},
-        "hls_prefer_native": True,
+    """Return the options of one attempt: yt-dlp uses up the stream of cookies."""
+    options = fixed_options() | {
         "socket_timeout": config.timeout_s,
         "sleep_interval_requests": config.request_pause_s,
-        "retries": 0,
-        "extractor_retries": 0,
-        "fragment_retries": config.retries,
-        "continuedl": True,
-        "ffmpeg_location": imageio_ffmpeg.get_ffmpeg_exe(),
-        "js_runtimes": {name: {"path": place} for name, place in runtimes().items()},
     }
     if config.proxy:
         options["proxy"] = config.proxy
@@ -165,7 +153,7 @@ def _options(config: WebConfig) -> dict[str, Any]:
         options["extractor_args"] = {"youtube": {"lang": [config.language]}}
         options["http_headers"] |= {"Accept-Language": config.language}
     if config.cookies_file:
-        options["cookiefile"] = str(config.cookies_file)
+        options["cookiefile"] = open_cookies(config.cookies_file)
     return options
 
 
@@ -181,6 +169,7 @@ def _extract(address: str, options: dict[str, Any]) -> dict[str, Any]:
 def _download(info: Mapping[str, Any], options: dict[str, Any]) -> None:
     from yt_dlp import YoutubeDL
 
+    hide_ffmpeg()
     with YoutubeDL(options) as ydl:
         ydl.process_ie_result(dict(info), download=True)
 
@@ -233,18 +222,3 @@ def _patiently(attempt: Callable[[], Result], config: WebConfig) -> Result:
             log.info("%s; retrying in %.3g s", reason, wait_s)
             time.sleep(wait_s)
     raise AssertionError("unreachable")
-
-
-class _Log:
-    """yt-dlp's messages in our log, one clean line each."""
-
-    def debug(self, message: str) -> None:
-        log.debug("%s", clean_text(message, REASON_LENGTH))
-
-    info = debug
-
-    def warning(self, message: str) -> None:
-        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))
-
-    def error(self, message: str) -> None:
-        log.debug("yt-dlp: %s", clean_text(message, REASON_LENGTH))

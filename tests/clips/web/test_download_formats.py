@@ -77,3 +77,10 @@ def test_of_two_images_of_one_size_the_one_with_sound_is_danced() -> None:
     assert choose([heard, silent], "dance", CONFIG) == heard
     larger = form("larger", 1080, 1920, acodec="none")
     assert choose([heard, larger], "dance", CONFIG) == larger
+
+
+@pytest.mark.parametrize("purpose", ["score", "dance"])
+def test_a_format_for_an_external_program_is_left_out(purpose: Any) -> None:
+    best = form("rtmp", 1080, 1920, protocol="rtmp")
+    assert choose([form("18", 360, 640), best], purpose, CONFIG) == form("18", 360, 640)
+    assert choose([best], purpose, CONFIG) is None

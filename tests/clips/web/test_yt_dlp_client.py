@@ -1,5 +1,6 @@
 """yt-dlp against a server of our own: every failure becomes a reason, and nothing comes twice."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,9 +10,13 @@ from robojackson.clips.sources import source
 from robojackson.clips.video import VideoLimits, probe
 from robojackson.clips.web.download_formats import FormatConfig
 from robojackson.clips.web.yt_dlp_client import WebConfig, fetch, listing, offer
-from robojackson.errors import DownloadFailed, SearchFailed, TruncatedVideo
+from robojackson.errors import BadConfiguration, DownloadFailed, SearchFailed, TruncatedVideo
 from tests.fixtures.web_server import PATIENT, Web
 
+COOKIES = (
+    b"# Netscape HTTP Cookie File\r\n# of a browser\r\n\r\n"
+    b"127.0.0.1\tFALSE\t/\tFALSE\t0\tsession\topensesame\r\n"
+)
 NOW = datetime(2026, 11, 21, tzinfo=UTC)
 
 
@@ -107,14 +112,46 @@ def test_progress_ends_with_the_whole_file(web: Web, tmp_path: Path) -> None:
     assert calls[-1] == (len(web.video), len(web.video))
 
 
-def test_cookies_are_passed_through(web: Web, tmp_path: Path) -> None:
-    """A cookie file that cannot be read is noticed, so it was opened."""
-    config = WebConfig(
-        private_addresses=True, retries=0, cookies_file=tmp_path / "folder" / "cookies.txt"
-    )
-    (tmp_path / "folder" / "cookies.txt").mkdir(parents=True)
-    with pytest.raises(DownloadFailed):
+@pytest.mark.parametrize("mode", [0o600, 0o400])
+def test_cookies_are_passed_through(web: Web, mode: int, tmp_path: Path) -> None:
+    """Page, file and their second attempts all get the cookie; the user's file stays as it was."""
+    jar = tmp_path / "cookies.txt"
+    jar.write_bytes(COOKIES)
+    jar.chmod(mode)
+    config = replace(PATIENT, cookies_file=jar)
+    web.faults = ["broken"]
+    chosen = offer(f"{web.url}/good/clip.mp4", "score", FormatConfig(), config)
+    web.faults = ["broken"]
+    fetch(chosen, tmp_path, config)
+    assert web.cookies == ["session=opensesame"] * 4
+    assert jar.read_bytes() == COOKIES
+    assert jar.stat().st_mode & 0o777 == mode
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("missing.txt", None, "no such file"),
+        ("", None, "a folder, not a file"),
+        ("picture.txt", b"\xff\xd8\xff", "no text in UTF-8"),
+        ("cookies.json", b'[{"name": "session"}]', "its first line is not '# Netscape"),
+    ],
+)
+def test_a_cookie_file_that_cannot_be_used_is_a_plain_line(
+    web: Web, name: str, content: bytes | None, reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    config = replace(PATIENT, cookies_file=path)
+    with pytest.raises(BadConfiguration, match=reason) as failure:
         offer(f"{web.url}/good/clip.mp4", "score", FormatConfig(), config)
+    with pytest.raises(BadConfiguration, match=reason):
+        listing(f"{web.url}/files/", config)
+    assert str(failure.value).startswith(f"web.cookies_file: {path}: ")
+    assert failure.value.key == "web.cookies_file"
+    assert not web.requests
+    assert path.exists() == (name != "missing.txt")
 
 
 def test_a_proxy_is_passed_through(web: Web) -> None:

@@ -9,9 +9,16 @@ import pytest
 
 from configs.find_config import FindConfig
 from flows.search import requests
-from flows.search.requests import ALL, find_dance, require_findable, require_online
+from flows.search.requests import (
+    ALL,
+    check_refresh,
+    find_dance,
+    require_findable,
+    require_online,
+)
 from robojackson.clips.sources import urls
-from robojackson.errors import SearchFailed
+from robojackson.errors import BadConfiguration, SearchFailed
+from robojackson.pipeline.yaml_loader import load
 from storage import candidate_catalogue
 from storage.store import Store
 from tasks.download_video import WebVideo
@@ -83,6 +90,24 @@ def test_a_video_that_was_downloaded_before_needs_no_network(
     (tmp_path / kept.key).unlink()
     with pytest.raises(SearchFailed, match="no connection to https://host/clip"):
         require_findable(address, store)
+
+
+def test_a_missing_cookie_file_is_reported_before_the_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder needs no cookies."""
+    monkeypatch.setattr(requests, "require_reachable", lambda page, proxy: None)
+    absent = {"web.cookies_file": str(tmp_path / "absent.txt")}
+    settings = load(FindConfig, "finding", absent)
+    monkeypatch.setattr(requests, "load", lambda cls, *_: settings if cls is FindConfig else None)
+    with pytest.raises(BadConfiguration, match=r"web\.cookies_file: .*absent\.txt: no such file"):
+        require_online(find_dance("apt", "site", "https://host/", None, settings), settings)
+    with pytest.raises(BadConfiguration, match="no such file"):
+        require_findable("https://host/clip.mp4", Store(tmp_path))
+    with pytest.raises(BadConfiguration, match="no such file"):
+        check_refresh(None, "finding", absent, None)
+    (tmp_path / "a.mp4").write_text("")
+    require_online(find_dance(str(tmp_path), "folder", "", None, settings), settings)
 
 
 @pytest.mark.medium
