@@ -16,7 +16,9 @@ from tests.fixtures.commands import Said, in_process
 from tests.fixtures.stand_in_tracker import NAME, stand_in, write_network, write_yaml
 from tests.fixtures.web_server import Web, serving
 
-FEEDBACK = {"dancer": True, "regulator": True, "regulator_onboard": True}
+FEEDBACK = dict.fromkeys(
+    ("dancer", "regulator", "regulator_g1_23", "regulator_onboard", "regulator_t1"), True
+)
 """Trackers without a file, or with one that ships, which are always here."""
 
 
@@ -184,7 +186,8 @@ def test_without_the_file_the_error_is_the_command_that_brings_it(pin, tmp_path:
 def test_an_unknown_tracker_lists_those_that_are(pin) -> None:
     pin()
     with pytest.raises(
-        UnknownName, match=r"unknown tracker 'twist3'.*regulator_onboard, standin, twist2"
+        UnknownName,
+        match=r"unknown tracker 'twist3'.*regulator_onboard, regulator_t1, standin, twist2",
     ):
         add_tracker("twist3")
 

@@ -74,9 +74,19 @@ def test_the_shipped_description_names_29_hinges_of_the_g1_once() -> None:
 
 
 def test_a_robot_without_a_tracker_is_one_line_that_lists_them() -> None:
-    with pytest.raises(BadPolicy, match=r"no tracker for robot 'g1_23'; trackers: .*twist2 \(g1\)"):
-        require_tracker("g1_23")
+    with pytest.raises(
+        BadPolicy, match=r"no tracker for robot 'strong'; trackers: .*twist2 \(g1\)"
+    ):
+        require_tracker("strong")
 
 
 def test_none_is_no_tracker() -> None:
-    assert require_tracker("g1_23", "none") is None
+    assert require_tracker("strong", "none") is None
+
+
+@pytest.mark.parametrize("robot", ["g1_23", "t1"])
+def test_the_other_fetched_robots_dance_at_once_by_a_yaml_alone(robot: str) -> None:
+    found = require_tracker(robot)
+    assert found is not None
+    assert (found.network, found.robot, found.file) == ("regulator", robot, None)
+    assert found.control_dt == robot_description(robot).control_dt
