@@ -58,7 +58,7 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     feet = foot_points(pose, motion.rest_joints)
     lowest = feet[..., 2].min(1)
     height = ground.centre_of_mass(pose.points)[:, 2]
-    falling = flight.free_fall(height, fps)
+    falling = flight.free_fall(height, fps) | flight.ballistic(height, lowest, fps)
     flying = flight.flight(lowest, height, falling, fps)
     floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
     notes = list(motion.notes)

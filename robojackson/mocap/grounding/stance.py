@@ -103,7 +103,8 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
 
 
 def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4"]:
-    """Return states in which a flight lasts no longer than the resulting body's fall."""
+    """Return states in which a flight lasts no longer than the resulting body's fall, or until the
+    clip is cut."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     if len(height) < SHORTEST_FLIGHT:
         return states
@@ -111,8 +112,12 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
     falls = np.gradient(np.gradient(height)) * fps**2 < -ground.GRAVITY / 2.0
     carried, lowest = np.array(states), body.feet[..., 2].argmin(1)
     for start, end in feet.stretches((states == AIR).all(1)):
-        known = np.flatnonzero(falls[start:end])
-        first, last = (start + known[0], start + known[-1] + 1) if len(known) else (end, end)
+        known = start + np.flatnonzero(falls[start:end])
+        first, last = (known[0], known[-1] + 1) if len(known) else (end, end)
+        if len(known) and start == 0:
+            first = start
+        if len(known) and end == len(states):
+            last = end
         for frame in (*range(start, first), *range(last, end)):
             carried[frame, lowest[frame]] = SLIDING
     return carried
