@@ -12,7 +12,7 @@ from pydantic import Field
 from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
-from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
+from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik, pivots
 from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
@@ -49,8 +49,11 @@ class Stance:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Measurements that do not change while the body is moved; `elsewhere`: frames in which other
-    parts than the feet carry it."""
+    """Measurements that do not change while the body is moved.
+
+    `soles`: foot points as they were seen; `elsewhere`: frames in which other parts than the feet
+    carry the body.
+    """
 
     fps: float
     speed: Float[np.ndarray, "T 4"]
@@ -59,6 +62,7 @@ class _Evidence:
     falling: np.ndarray
     jumps: np.ndarray
     elsewhere: np.ndarray
+    soles: Float[np.ndarray, "T 4 3"]
     config: GroundingConfig
 
     def states(self, body: Body) -> Int[np.ndarray, "T 4"]:
@@ -68,6 +72,11 @@ class _Evidence:
             height, self.speed, unsupported, self.fps, self.config.contact, self.along
         )
         return np.where(self.jumps[:, None], AIR, found).astype(np.int8)
+
+    def standing(self, planted: np.ndarray) -> np.ndarray:
+        """Return the planted points of feet that do not turn."""
+        turning = pivots.turning(self.soles, planted, self.fps)
+        return np.asarray(planted & ~np.repeat(turning, 2, axis=1))
 
     def lowest(self, body: Body) -> Float[np.ndarray, " T"]:
         return ground.support_height(body.pose.points, body.feet, self.elsewhere)
@@ -92,15 +101,15 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     speed, root = contacts.image_speed(body.feet, fps), body.pose.points[:, 0]
     along = contacts.ray_speed(body.feet, fps)
     slope = root[:, 1] / root[:, 0]
-    evidence = _Evidence(fps, speed, along, slope, falling, jumps, elsewhere, config)
+    evidence = _Evidence(fps, speed, along, slope, falling, jumps, elsewhere, body.feet, config)
     bias = np.full((len(falling), 2), feet.pitch_bias(body.feet[~elsewhere], fps))
     body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
-    planted = pinned = evidence.states(body) == PLANTED
+    planted = pinned = evidence.standing(evidence.states(body) == PLANTED)
     share = np.zeros((len(falling), 2))
     for _ in range(config.foot_pinning.rounds):
         body, share = _pinned(body, planted, evidence, flying)
         states = evidence.states(body)
-        pinned, planted = planted, planted | (states == PLANTED)
+        pinned, planted = planted, evidence.standing(planted | (states == PLANTED))
         airborne = (states == AIR).all(1) & ~elsewhere
         flying = jumps | air.flight(evidence.lowest(body), height, airborne, fps)
     body = evidence.dropped(body, flying)
