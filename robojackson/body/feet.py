@@ -52,6 +52,8 @@ def pitch_bias(feet: Float[np.ndarray, "T 4 3"], fps: float) -> float:
 
     Zero where there are fewer than three such frames.
     """
+    if len(feet) < 2:
+        return 0.0
     toe = feet[:, 1::2]
     speed = np.linalg.norm(np.gradient(toe[..., 1:], axis=0), axis=-1) * fps
     low = feet.reshape(-1, 2, 2, 3)[..., 2].min(2)

@@ -56,9 +56,11 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     local[:, 0] = motion.to_world @ local[:, 0]
     pose = forward(local, motion.rest_joints[None], motion.pelvis @ motion.to_world.T)
     feet = foot_points(pose, motion.rest_joints)
-    lowest = feet[..., 2].min(1)
     height = ground.centre_of_mass(pose.points)[:, 2]
     falling = flight.free_fall(height, fps)
+    elsewhere = ground.off_feet(pose.points, feet, falling, fps)
+    lowest = ground.support_height(pose.points, feet, elsewhere)
+    falling = falling | flight.ballistic(height, lowest, fps)
     flying = flight.flight(lowest, height, falling, fps)
     floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
     notes = list(motion.notes)
@@ -70,7 +72,7 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
         notes.append("the trunk points down: are the file's axes the usual ones? See --up")
     speed = np.linalg.norm(np.gradient(feet[..., :2], axis=0), axis=-1) * fps
     config = contacts.ContactConfig()
-    states = contacts.contacts(feet[..., 2], speed, falling, fps, config)
+    states = contacts.contacts(feet[..., 2], speed, falling | elsewhere, fps, config)
     return _sequence(fps, local, pose, motion.rest_joints, states, tuple(notes), motion.betas)
 
 

@@ -4,8 +4,9 @@ Each of the four points has three states; a touching point is low over the refit
 one is also still in the image and, as far as a single camera can measure it, along the ray: a
 person who walks towards the camera hardly moves in the image. All 81 joint states are evaluated
 together because of a constraint: outside free fall the body is supported, so that all four in the
-air is impossible there. The most probable path is found by dynamic programming (Viterbi 1967).
-Metres, seconds; floor at z = 0. Order: `motion.smpl_sequence.CONTACT_POINTS`.
+air is impossible there unless another part carries it. The most probable path is found by dynamic
+programming (Viterbi 1967). Metres, seconds; floor at z = 0. Order:
+`motion.smpl_sequence.CONTACT_POINTS`.
 """
 
 from itertools import product, repeat
@@ -54,18 +55,19 @@ class ContactConfig:
 def contacts(
     height: Float[np.ndarray, "T 4"],
     speed: Float[np.ndarray, "T 4"],
-    falling: np.ndarray,
+    unsupported: np.ndarray,
     fps: float,
     config: ContactConfig,
     along: Float[np.ndarray, "T 4"] | None = None,
 ) -> Int[np.ndarray, "T 4"]:
-    """Return the most probable state of every point in every frame; outside free fall one is never
-    AIR.
+    """Return the most probable state of every point in every frame; one is never AIR where the feet
+    must carry the body.
 
     Args:
         height: Height of the points over the floor, metres.
         speed: Speed in the image at the person's distance (`image_speed`), m/s.
-        falling: Frames of free fall.
+        unsupported: Frames in which no foot has to carry the body: of free fall, and those in which
+            another part does.
         fps: Frames a second.
         config: Settings of the model.
         along: Speed along the ray (`ray_speed`), m/s; None where unknown.
@@ -75,7 +77,7 @@ def contacts(
     points = np.arange(len(CONTACT_POINTS))
     joint = single[:, points, JOINT].sum(-1)
     airborne = (JOINT == AIR).all(1)
-    joint[np.ix_(~np.asarray(falling, bool), airborne)] = IMPOSSIBLE
+    joint[np.ix_(~np.asarray(unsupported, bool), airborne)] = IMPOSSIBLE
     changes = (JOINT[:, None] != JOINT[None]).sum(-1)
     path = viterbi(-joint, repeat(config.change * changes, len(joint) - 1))
     result: np.ndarray = JOINT[path].astype(np.int8)

@@ -15,29 +15,44 @@ SHORTEST_FALL_S = 0.1
 FALL_SHARE = 0.35
 """Least mean acceleration of a whole flight, in multiples of gravity."""
 FLIGHT_EDGE_S = 0.15
-"""Part of a free fall's beginning and end that smoothing hides, seconds."""
+"""Part of a free fall's beginning and end that smoothing hides, seconds; so does it at both ends of
+a clip, where its odd reflection makes the acceleration zero."""
 FLIGHT_MARGIN_S, RISE_SHARE = 0.07, 0.45
 """Corrections of a jump: the time that the change of sign misses at either end, and the least rise
 of the feet, as a share of that of a body in the air for as long."""
 
 
-def free_fall(height: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
+def free_fall(height: Float[np.ndarray, " T"], fps: float, cut: bool = False) -> np.ndarray:
     """Return the frames in which the pelvis falls freely: its acceleration is below -g / 2 for a
     while.
 
     Args:
         height: Height of the pelvis, metres.
         fps: Frames a second.
+        cut: Whether a fall near an end of the clip continues to it.
     """
     if len(height) < 5:
         return np.zeros(len(height), bool)
     acceleration = np.gradient(np.gradient(lowpass(height, fps, FALL_CUTOFF_HZ))) * fps**2
     falling = acceleration < -GRAVITY / 2.0
+    if cut:
+        falling = _to_ends(falling, acceleration, fps)
     for start, end in stretches(falling):
         if (end - start) / fps < SHORTEST_FALL_S:
             falling[start:end] = False
     result: np.ndarray = falling
     return result
+
+
+def _to_ends(falling: np.ndarray, acceleration: Float[np.ndarray, " T"], fps: float) -> np.ndarray:
+    """Return a fall with the part that smoothing hides at an end of the clip: there the body still
+    accelerates downward, where a landing would accelerate it upward."""
+    edge, found = round(FLIGHT_EDGE_S * fps), np.array(falling)
+    for way in (slice(None), slice(None, None, -1)):
+        first = int(found[way].argmax())
+        if found.any() and first <= edge and (acceleration[way][:first] < 0.0).all():
+            found[way][:first] = True
+    return found
 
 
 def ballistic(
@@ -47,14 +62,15 @@ def ballistic(
     implies.
 
     Push-off and landing accelerate upward, so that a flight lasts from one change of sign of the
-    acceleration to the next, whatever the smoothing.
+    acceleration to the next, whatever the smoothing. Of a clip that is cut in the air, only the
+    other end of the flight shows the ground.
 
     Args:
         height: Height of the centre of mass, metres; any level.
         lowest: Height of the lowest foot point, metres; any level.
         fps: Frames a second.
     """
-    falling = free_fall(height, fps)
+    falling = free_fall(height, fps, cut=True)
     flying = np.zeros(len(height), bool)
     if not falling.any():
         return flying
@@ -65,12 +81,19 @@ def ballistic(
             continue
         left = _zero_before(acceleration, start) - margin
         landed = _zero_before(acceleration, end) + margin
-        ground = np.interp([left, landed], frames, lowest).max()
+        ground = np.interp([left, landed], frames, lowest)[_shown(falling, start, end)].max()
         rise = GRAVITY / 8.0 * ((landed - left) / fps) ** 2
         inside = slice(max(math.ceil(left), 0), math.floor(landed) + 1)
         if lowest[inside].max() - ground > RISE_SHARE * rise:
             flying[inside] = True
     return flying
+
+
+def _shown(falling: np.ndarray, start: int, end: int) -> list[bool]:
+    """Return whether the clip shows the take-off and the landing of a flight; of neither, both
+    count."""
+    shown = [start > 0 or not falling[0], end < len(falling) or not falling[-1]]
+    return shown if any(shown) else [True, True]
 
 
 def _zero_before(values: Float[np.ndarray, " T"], frame: int) -> float:

@@ -12,7 +12,7 @@ from pydantic import Field
 from robojackson.body import feet
 from robojackson.body.smoothing import lowpass
 from robojackson.config import config_dataclass
-from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik
+from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik, pivots
 from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
@@ -49,7 +49,11 @@ class Stance:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Measurements that do not change while the body is moved."""
+    """Measurements that do not change while the body is moved.
+
+    `soles`: foot points as they were seen; `elsewhere`: frames in which other parts than the feet
+    carry the body.
+    """
 
     fps: float
     speed: Float[np.ndarray, "T 4"]
@@ -57,41 +61,57 @@ class _Evidence:
     slope: Float[np.ndarray, " T"]
     falling: np.ndarray
     jumps: np.ndarray
+    elsewhere: np.ndarray
+    soles: Float[np.ndarray, "T 4 3"]
     config: GroundingConfig
 
     def states(self, body: Body) -> Int[np.ndarray, "T 4"]:
         height = body.feet[..., 2]
+        unsupported = self.falling | self.elsewhere
         found = contacts.contacts(
-            height, self.speed, self.falling, self.fps, self.config.contact, self.along
+            height, self.speed, unsupported, self.fps, self.config.contact, self.along
         )
         return np.where(self.jumps[:, None], AIR, found).astype(np.int8)
 
+    def standing(self, planted: np.ndarray) -> np.ndarray:
+        """Return the planted points of feet that do not turn."""
+        turning = pivots.turning(self.soles, planted, self.fps)
+        return np.asarray(planted & ~np.repeat(turning, 2, axis=1))
+
+    def lowest(self, body: Body) -> Float[np.ndarray, " T"]:
+        return ground.support_height(body.pose.points, body.feet, self.elsewhere)
+
     def dropped(self, body: Body, airborne: np.ndarray) -> Body:
-        """Return the body with the floor under its lowest foot point moved to z = 0."""
-        lowest = body.feet[..., 2].min(1)
-        floor = ground.floor_height(lowest, airborne, self.fps, self.config.floor_cutoff_hz)
+        """Return the body with the floor under its lowest point moved to z = 0."""
+        floor = ground.floor_height(
+            self.lowest(body), airborne, self.fps, self.config.floor_cutoff_hz
+        )
         return body.shifted(np.outer(-floor, ABOVE))
 
 
 def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     """Return the body on the floor, its feet level and pinned where planted, and the contacts."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
-    jumps = air.ballistic(height, body.feet[..., 2].min(1), fps)
-    falling = air.free_fall(height, fps) | jumps
-    flying = air.flight(body.feet[..., 2].min(1), height, falling, fps) | jumps
+    falling = air.free_fall(height, fps)
+    elsewhere = ground.off_feet(body.pose.points, body.feet, falling, fps)
+    lowest = ground.support_height(body.pose.points, body.feet, elsewhere)
+    jumps = air.ballistic(height, lowest, fps)
+    falling = falling | jumps
+    flying = air.flight(lowest, height, falling, fps) | jumps
     speed, root = contacts.image_speed(body.feet, fps), body.pose.points[:, 0]
     along = contacts.ray_speed(body.feet, fps)
-    evidence = _Evidence(fps, speed, along, root[:, 1] / root[:, 0], falling, jumps, config)
-    bias = np.full((len(falling), 2), feet.pitch_bias(body.feet, fps))
+    slope = root[:, 1] / root[:, 0]
+    evidence = _Evidence(fps, speed, along, slope, falling, jumps, elsewhere, body.feet, config)
+    bias = np.full((len(falling), 2), feet.pitch_bias(body.feet[~elsewhere], fps))
     body = evidence.dropped(body.aimed(feet.turn_feet(body.pose.points, bias)), flying)
-    planted = pinned = evidence.states(body) == PLANTED
+    planted = pinned = evidence.standing(evidence.states(body) == PLANTED)
     share = np.zeros((len(falling), 2))
     for _ in range(config.foot_pinning.rounds):
         body, share = _pinned(body, planted, evidence, flying)
         states = evidence.states(body)
-        pinned, planted = planted, planted | (states == PLANTED)
-        airborne = (states == AIR).all(1)
-        flying = jumps | air.flight(body.feet[..., 2].min(1), height, airborne, fps)
+        pinned, planted = planted, evidence.standing(planted | (states == PLANTED))
+        airborne = (states == AIR).all(1) & ~elsewhere
+        flying = jumps | air.flight(evidence.lowest(body), height, airborne, fps)
     body = evidence.dropped(body, flying)
     for _ in range(LIFTS):
         body = body.aimed(leg_ik.move_feet(body.pose.points, leg_ik.lift_offsets(body.feet)), share)
@@ -99,11 +119,12 @@ def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     states = evidence.states(body)
     states = np.where((states == PLANTED) & ~pinned, SLIDING, states)
     states = np.where(pinned, PLANTED, states).astype(np.int8)
-    return Stance(body, _carried(states, body, fps))
+    return Stance(body, np.where(elsewhere[:, None], states, _carried(states, body, fps)))
 
 
 def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4"]:
-    """Return states in which a flight lasts no longer than the resulting body's fall."""
+    """Return states in which a flight lasts no longer than the resulting body's fall, or until the
+    clip is cut."""
     height = ground.centre_of_mass(body.pose.points)[:, 2]
     if len(height) < SHORTEST_FLIGHT:
         return states
@@ -111,8 +132,12 @@ def _carried(states: np.ndarray, body: Body, fps: float) -> Int[np.ndarray, "T 4
     falls = np.gradient(np.gradient(height)) * fps**2 < -ground.GRAVITY / 2.0
     carried, lowest = np.array(states), body.feet[..., 2].argmin(1)
     for start, end in feet.stretches((states == AIR).all(1)):
-        known = np.flatnonzero(falls[start:end])
-        first, last = (start + known[0], start + known[-1] + 1) if len(known) else (end, end)
+        known = start + np.flatnonzero(falls[start:end])
+        first, last = (known[0], known[-1] + 1) if len(known) else (end, end)
+        if len(known) and start == 0:
+            first = start
+        if len(known) and end == len(states):
+            last = end
         for frame in (*range(start, first), *range(last, end)):
             carried[frame, lowest[frame]] = SLIDING
     return carried

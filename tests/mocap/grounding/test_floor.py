@@ -70,10 +70,12 @@ def test_a_small_jump_is_found_at_every_frame_rate(fps: float) -> None:
         assert air.ballistic(body, feet, fps).any()
 
 
-def test_a_person_who_drops_into_a_squat_does_not_jump() -> None:
-    time = np.arange(60) / 30.0
+@pytest.mark.parametrize("frames", [60, 28, 26, 24])
+def test_a_person_who_drops_into_a_squat_does_not_jump(frames: int) -> None:
+    """The shorter clips end in the fall."""
+    time = np.arange(frames) / 30.0
     height = 1.0 - 0.4 * np.clip((time - 0.7) / 0.25, 0.0, 1.0) ** 2
-    assert not air.ballistic(height, np.zeros(60), 30.0).any()
+    assert not air.ballistic(height, np.zeros(frames), 30.0).any()
 
 
 def test_flight_reaches_from_the_last_to_the_first_touch() -> None:
