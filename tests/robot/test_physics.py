@@ -103,7 +103,8 @@ def test_a_servo_of_a_limited_hinge_gives_way_to_a_motor(tmp_path: Path) -> None
     described = machine.description(tmp_path)
     with pytest.raises(BadConfiguration, match="not a torque motor"):
         require_trainable(load_robot(described))
-    robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}))
+    armature = {"*": 0.02}
+    robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}, armature=armature))
     require_trainable(robot)
     knee = robot.model.actuator("left_knee")
     assert (knee.biastype[0], knee.gear[0]) == (mujoco.mjtBias.mjBIAS_NONE, 20.0)
