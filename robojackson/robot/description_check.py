@@ -9,6 +9,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from robojackson.errors import RoboJacksonError
 from robojackson.robot.checks import check_contact, check_joints
@@ -23,6 +24,8 @@ SWAPPED_M = 0.01
 MIRRORED_M = 0.005
 UPRIGHT = 0.5
 """Least cosine of the angles of the root's x axis to forward and of its z axis to up."""
+MOST_DAMPING = 2.0
+"""Largest stable damping of a hinge times the time step, in multiples of its inertia."""
 PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.startswith("left_"))
 
 
@@ -36,7 +39,42 @@ def problems(description: RobotDescription) -> list[str]:
         robot = load_robot(description)
     except RoboJacksonError as cause:
         return [str(cause)]
-    return [*_upright(robot), *_out_of_range(robot), *_sides(robot)]
+    return [*_upright(robot), *_out_of_range(robot), *_sides(robot), *unstable_gains(robot)]
+
+
+def unstable_gains(robot: Robot) -> Iterator[str]:
+    """Yield a line about the hinge whose damping is the furthest from stable, if one is not.
+
+    A hinge that feels the inertia I turns at (1 - kd h / I) v after a step h in which the torque of
+    its damping kd at the speed v was held: beyond 2 it swings up to its torque limit.
+    """
+    timestep, inertia = float(robot.model.opt.timestep), hinge_inertia(robot)
+    damping = np.where(robot.actuated, robot.actuation.damping, 0.0)
+    ratio = damping * timestep / inertia
+    worst, count = int(np.argmax(ratio)), int((ratio > MOST_DAMPING).sum())
+    if not count:
+        return
+    others = f" ({count} hinges are above)" if count > 1 else ""
+    armature = robot.model.dof_armature[6 + worst] + (ratio[worst] - 1) * inertia[worst]
+    yield (
+        f"{where(robot.description, 'damping')}: the gains of {robot.joint_names[worst]!r} are "
+        f"unstable: damping {damping[worst]:.3g} Nm s/rad x timestep {timestep:g} s / inertia "
+        f"{inertia[worst]:.2g} kg m^2 = {ratio[worst]:.3g}, at most {MOST_DAMPING:g} is stable"
+        f"{others}; name its motor's armature ({armature:.2g} makes it 1), less damping "
+        f"({inertia[worst] / timestep:.2g}) or a shorter simulation.timestep"
+    )
+
+
+def hinge_inertia(robot: Robot) -> Float[np.ndarray, " J"]:
+    """Return the inertia that a torque on each hinge feels in the rest pose, kg m^2: 1 over the
+    diagonal of the inverse mass matrix."""
+    model, data = robot.model, mujoco.MjData(robot.model)
+    data.qpos[:] = robot.standing
+    mujoco.mj_forward(model, data)
+    inverse = np.zeros((model.nv, model.nv))
+    mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
+    result: np.ndarray = 1.0 / np.diag(inverse)[6:]
+    return result
 
 
 def _unknown_names(description: RobotDescription) -> Iterator[str]:

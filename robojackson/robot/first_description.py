@@ -30,7 +30,8 @@ BENT_RAD = 0.3
 SIDEWAYS = 0.9
 """Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
-"""Of a control step; training takes five steps of the model by default."""
+"""Of a control step: five steps of the model, or as many as make the usual one where that is too
+short or too long."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -241,9 +242,8 @@ def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
 
 
 def _clock_lines(timestep: float) -> list[str]:
-    steps, note = SUBSTEPS, ""
+    steps = SUBSTEPS
     if not SHORTEST_S <= steps * timestep <= LONGEST_S:
         steps = max(1, round(USUAL_S / timestep))
-        note = f"; to train: --set track.control.substeps={steps}"
     named = f"{steps} steps of {1e3 * timestep:g} ms of the model"
-    return [f"control_dt: {steps * timestep:g} # seconds: {named}{note}"]
+    return [f"control_dt: {steps * timestep:g} # seconds: {named}"]

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -15,8 +16,9 @@ from robojackson.pipeline.robot_descriptions import read_description
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
 from robojackson.retarget.targets.tails import TailConfig
-from robojackson.rl.config.train_config import EvaluateConfig
+from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig
 from robojackson.rl.evaluation.strict_success import StrictEvaluator
+from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.description_check import problems
 from robojackson.robot.first_description import Draft, first_description, name_of_model
@@ -74,7 +76,9 @@ def test_a_machine_with_ankles_and_soles_is_described_with_its_corners(tmp_path:
     draft, found = drafted(model_file(tmp_path, machine.mjcf()), tmp_path)
     written = machine.description(tmp_path)
     assert (draft.left, draft.guessed) == (("torque_limits",), ("sites.head",))
-    assert problems(found) == []
+    (line,) = problems(found)
+    assert "unstable" in line, "its hinges have no armature"
+    assert problems(replace(found, armature={"*": 0.05})) == []
     assert found.sites.keys() == written.sites.keys()
     assert {k: body for k, (body, _) in found.sites.items()} == {
         k: body for k, (body, _) in written.sites.items()
@@ -134,6 +138,19 @@ def test_the_limits_that_hinges_have_themselves_are_taken(tmp_path: Path) -> Non
     draft, found = drafted(model_file(tmp_path, text), tmp_path)
     assert found.torque_limits == {"left_knee": 33.0, "right_knee": 33.0}
     assert '  # "*_hip_pitch": 50.0' in draft.text
+
+
+@pytest.mark.parametrize(("timestep", "steps"), [(0.001, 15), (0.002, 5), (0.01, 2)])
+def test_a_draft_names_no_setting_of_the_training(
+    timestep: float, steps: int, tmp_path: Path
+) -> None:
+    """The substeps are the robot's own."""
+    text = machine.mjcf().replace("<compiler", f'<option timestep="{timestep}"/><compiler')
+    draft, found = drafted(model_file(tmp_path, text), tmp_path)
+    assert [line for line in draft.text.splitlines() if "substeps=" in line] == []
+    assert f"{steps} steps of {1e3 * timestep:g} ms" in draft.text
+    robot = load_robot(found)
+    assert (resolved(ControlConfig(), robot).substeps, robot.substeps) == (steps, steps)
 
 
 def test_odd_names_stay_text(tmp_path: Path) -> None:

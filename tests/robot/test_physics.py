@@ -12,8 +12,10 @@ import pytest
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.retarget.solver.collision import Detector
+from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.reset_states import default_standing_pose
-from robojackson.rl.sim.motors import Motors
+from robojackson.rl.sim.motors import Motors, gains
+from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.trainable import require_trainable
 from robojackson.robot.description import FallRule, RobotDescription, SimulationDescription
 from robojackson.robot.fall import Fall, standing_height, up_axis
@@ -101,7 +103,8 @@ def test_a_servo_of_a_limited_hinge_gives_way_to_a_motor(tmp_path: Path) -> None
     described = machine.description(tmp_path)
     with pytest.raises(BadConfiguration, match="not a torque motor"):
         require_trainable(load_robot(described))
-    robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}))
+    armature = {"*": 0.02}
+    robot = load_robot(dataclasses.replace(described, torque_limits={"*": 20.0}, armature=armature))
     require_trainable(robot)
     knee = robot.model.actuator("left_knee")
     assert (knee.biastype[0], knee.gear[0]) == (mujoco.mjtBias.mjBIAS_NONE, 20.0)
@@ -193,6 +196,37 @@ def test_a_motor_that_the_control_law_cannot_use_is_refused(tmp_path: Path, kind
     mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace("<motor ", f"<{kind} ", 1))
     with pytest.raises(BadConfiguration, match=r"'abdomen_y' is not (a torque motor|the same in)"):
         require_trainable(altered(mjcf=mjcf, torque_limits={}))
+
+
+KNEE = '<motor gear="200" joint="right_knee" name="right_knee"/>'
+
+
+@pytest.mark.parametrize("second", [50, 200])
+@pytest.mark.parametrize("limits", [{}, {"right_knee": 90.0}])
+def test_motors_of_one_hinge_have_its_gains_together(
+    second: float, limits: dict[str, float], tmp_path: Path
+) -> None:
+    """Each had the whole: two of them were twice as stiff."""
+    more = f'{KNEE}<motor gear="{second}" joint="right_knee" name="second"/>'
+    mjcf = with_motors(tmp_path / "two.xml", lambda text: text.replace(KNEE, more))
+    robot = altered(mjcf=mjcf, torque_limits=limits)
+    knee, error = robot.joint_names.index("right_knee"), 0.01
+    sim = Simulation(robot, ControlConfig(law="hold"), 1)
+    both = sim.motors.hinge == knee
+    assert both.sum() == 2
+    start = np.array([robot.standing])
+    sim.place(np.zeros(1, int), start, np.zeros((1, robot.model.nv)))
+    sim.step(start[:, 7:][:, sim.motors.hinge] + error * both)
+    torque = sim.datas[0].ctrl * sim.motors.gear
+    assert torque[both].sum() == pytest.approx(error * robot.actuation.stiffness[knee])
+    assert np.ptp(torque[both] / sim.motors.limit[both]) < 1e-9, "each by its limit"
+    assert sim.kd[both].sum() == pytest.approx(robot.actuation.damping[knee])
+
+
+def test_a_motor_alone_has_the_gains_of_its_hinge_to_the_bit(robot: Robot) -> None:
+    (kp, kd), hinge = gains(robot, ControlConfig()), Motors.of(robot.model).hinge
+    np.testing.assert_array_equal(kp, robot.actuation.stiffness[hinge])
+    np.testing.assert_array_equal(kd, robot.actuation.damping[hinge])
 
 
 @pytest.mark.parametrize("shape", ["box", "mesh", "cylinder", "ellipsoid"])

@@ -13,7 +13,7 @@ LASTING, FALLING = 2, 4
 """Number of evaluated bodies: the trained one, a variant of it, and those that do not dance."""
 FALLING_SHARE = 0.3
 """Time after which the bodies that do not dance lie on the floor, seconds."""
-PASSPORT_CASES = 20
+PASSPORT_CASES = 18
 TIMED_STEPS = 400
 AROUND_A_STEP = 1.6
 """Time of a simulated step with control and scoring, in multiples of MuJoCo's alone."""

@@ -31,9 +31,10 @@ def lead_of(
         return None
     require_usable(reference)
     offset = np.asarray(reference.cycle_offset, float) if reference.cyclic else None
-    qpos, hinge = np.asarray(reference.qpos, float), Motors.of(robot.model).hinge
-    torque = motor_torques(robot, qpos, reference.dt, offset, Tolerance())[:, hinge]
+    qpos, motors = np.asarray(reference.qpos, float), Motors.of(robot.model)
+    torques = motor_torques(robot, qpos, reference.dt, offset, Tolerance())
+    torque = torques[:, motors.hinge] * motors.share
     kp, kd = gains(robot, control)
-    speed = np.asarray(reference.qvel, float)[:, 6:][:, hinge]
+    speed = np.asarray(reference.qvel, float)[:, 6:][:, motors.hinge]
     result: np.ndarray = share * (torque + kd * speed) / kp
     return result

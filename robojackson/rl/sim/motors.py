@@ -40,6 +40,17 @@ class Motors:
             limit=np.array([_largest(model, index) for index in range(model.nu)]),
         )
 
+    @property
+    def share(self) -> Float[np.ndarray, " nu"]:
+        """Share of each motor in the gains and the torque of its hinge: 1 alone; several share in
+        proportion to their torque limits, evenly where these are zero or infinite."""
+        together = self.hinge[:, None] == self.hinge
+        total = np.where(together, self.limit, 0.0).sum(1)
+        result: np.ndarray = 1.0 / together.sum(1)
+        by_limit = (result < 1) & (total > 0) & np.isfinite(total)
+        result[by_limit] = self.limit[by_limit] / total[by_limit]
+        return result
+
 
 def _largest(model: mujoco.MjModel, index: int) -> float:
     """Return the largest torque of a motor, within the bound of its joint, N m."""
@@ -51,9 +62,9 @@ def gains(
     robot: Robot, control: ControlConfig
 ) -> tuple[Float[np.ndarray, " nu"], Float[np.ndarray, " nu"]]:
     """Return gains of the PD law, Nm/rad and Nm s/rad: the robot's own, unless the configuration
-    has multiples of the torque limit."""
+    has multiples of the torque limit; the motors of one hinge have its gains together."""
     motors, own = Motors.of(robot.model), robot.actuation
-    kp = own.stiffness[motors.hinge]
+    kp = own.stiffness[motors.hinge] * motors.share
     if control.stiffness is not None:
         kp = control.stiffness * motors.limit
     kd = own.damping[motors.hinge] * (kp / own.stiffness[motors.hinge])

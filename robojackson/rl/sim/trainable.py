@@ -1,19 +1,21 @@
-"""Requirements of training on a robot: torque motors, and a stand within its fall rule."""
+"""Requirements of training on a robot: torque motors, stable gains, a stand that is no fall."""
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool
 
 from robojackson.errors import BadConfiguration
+from robojackson.robot.description_check import unstable_gains
 from robojackson.robot.fall import Fall, standing_height
 from robojackson.robot.model import Robot
 
 
 def require_trainable(robot: Robot) -> None:
-    """Raise for a robot without usable motors, or whose stand counts as a fall.
+    """Raise for a robot without usable motors or gains, or whose stand counts as a fall.
 
     Raises:
-        BadConfiguration: it has no torque motors with a range, or it is too small.
+        BadConfiguration: it has no torque motors with a range, it is too small, or its gains are
+            unstable.
     """
     model, reason, fall = robot.model, "", Fall.of(robot)
     motors = _torque_motors(model)
@@ -32,6 +34,8 @@ def require_trainable(robot: Robot) -> None:
             f"it stands with its root {height:.2f} m above the floor, and less than "
             f"{fall.height:g} m counts as a fall (fall.height of its YAML)"
         )
+    else:
+        reason = next(unstable_gains(robot), "")
     if reason:
         raise BadConfiguration(
             f"training is not possible on robot {robot.description.name!r} yet: {reason}; "

@@ -1,7 +1,10 @@
 """The passport: one line a case, each of which changes what it says."""
 
+import copy
 from dataclasses import replace
+from typing import Literal
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -27,7 +30,9 @@ from robojackson.rl.policy import Policy
 from robojackson.rl.sim.feedforward import lead_of
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import Simulation
+from robojackson.rl.sim.variation import Variation, varied
 from robojackson.robot.model import Robot, load_robot
+from tests.fixtures.robots import G1, description
 
 BRIEF = EvaluateConfig(seconds=0.3, phases=2, resets=1, passport=True)
 
@@ -53,6 +58,52 @@ def test_every_case_differs_from_the_nominal_one(robot: Robot) -> None:
     plain = found[0]
     for case in found[1:]:
         assert (case.variation, case.conditions) != (plain.variation, plain.conditions), case.name
+
+
+@pytest.mark.parametrize("timestep", [0.0025, 0.01])
+def test_a_delay_is_a_case_once(timestep: float, robot: Robot) -> None:
+    """20 ms late was a control step late, as 10 ms."""
+    simulation = replace(robot.description.simulation, timestep=timestep)
+    quick = load_robot(replace(robot.description, control_dt=0.01, simulation=simulation))
+    names = [case.name for case in cases(quick, 0)]
+    assert len(set(names)) == len(names)
+    assert [name for name in names if "late" in name] == ["action 10 ms late"]
+
+
+def test_a_delay_that_is_no_step_of_the_physics_is_no_case(robot: Robot) -> None:
+    simulation = replace(robot.description.simulation, timestep=0.03)
+    slow = load_robot(replace(robot.description, control_dt=0.03, simulation=simulation))
+    assert [case.name for case in cases(slow, 0) if "late" in case.name] == ["action 30 ms late"]
+
+
+def integrators(robot: Robot) -> list[str]:
+    found = [case.name for case in cases(robot, 0)]
+    return [name.removeprefix("integrator ") for name in found if name.startswith("integrator")]
+
+
+@pytest.mark.parametrize(
+    ("own", "others"),
+    [("RK4", ["Euler"]), ("Euler", ["RK4"]), ("implicitfast", ["RK4"])],
+)
+def test_an_integrator_that_moves_the_robot_as_another_is_no_case(
+    own: Literal["RK4", "Euler", "implicitfast"], others: list[str], robot: Robot
+) -> None:
+    """Euler and implicitfast are both implicit in the damping of hinges, Humanoid-v5's own."""
+    assert integrators(varied(robot, Variation(integrator=own))) == others
+
+
+def test_integrators_that_differ_are_cases(robot: Robot) -> None:
+    explicit = copy.copy(robot.model)
+    explicit.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    assert integrators(replace(robot, model=explicit)) == ["Euler", "implicitfast"]
+    dragging = copy.copy(robot.model)
+    dragging.opt.viscosity = 0.1
+    assert integrators(replace(robot, model=dragging)) == ["Euler", "implicitfast"]
+
+
+@G1
+def test_the_integrators_of_a_robot_without_damping_differ_by_rounding() -> None:
+    assert integrators(load_robot(description("g1"))) == ["RK4"]
 
 
 def test_an_evaluation_with_a_passport_has_a_row_a_case(

@@ -1,6 +1,7 @@
 """Feed-forward: the PD law gives the torque that the reference requires."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from robojackson.rl.sim.motors import Motors, gains
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.sim.simulation import resolved
 from robojackson.robot.fall import Fall
+from robojackson.robot.mjcf import mjcf_path
 from robojackson.robot.model import Robot, load_robot
 
 AHEAD = ControlConfig(feedforward=1.0)
@@ -38,6 +40,24 @@ def test_on_the_reference_the_pd_law_gives_its_torque(robot: Robot, sway: Refere
     kp, kd = gains(robot, AHEAD)
     speed = np.asarray(sway.qvel)[:, 6:][:, hinge]
     np.testing.assert_allclose(kp * lead - kd * speed, torques(robot, sway)[:, hinge], atol=1e-9)
+
+
+def test_two_motors_of_a_hinge_give_its_torque_together(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """Each gave the whole."""
+    motor = '<motor gear="{}" joint="right_knee" name="{}"/>'
+    text = mjcf_path(robot.description).read_text()
+    both = motor.format(150, "right_knee") + motor.format(50, "second")
+    (tmp_path / "two.xml").write_text(text.replace(motor.format(200, "right_knee"), both))
+    two = load_robot(replace(robot.description, mjcf=str(tmp_path / "two.xml")))
+    lead, hinge = lead_of(two, sway, AHEAD), Motors.of(two.model).hinge
+    assert lead is not None
+    (kp, kd), speed = gains(two, AHEAD), np.asarray(sway.qvel)[:, 6:][:, hinge]
+    knees = hinge == robot.joint_names.index("right_knee")
+    assert knees.sum() == 2
+    given = (kp * lead - kd * speed)[:, knees].sum(1)
+    np.testing.assert_allclose(given, torques(robot, sway)[:, hinge[knees][0]], atol=1e-9)
 
 
 def test_without_it_nothing_leads(robot: Robot, sway: ReferenceMotion) -> None:
