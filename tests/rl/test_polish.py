@@ -2,15 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from robojackson.api import policy_training
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.train_config import TrackConfig, TrainConfig
-from robojackson.rl.training import _warn_of_short_budget, polishes, residual_learning, sharper
+from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
+from robojackson.rl.policy_facts import fact
+from robojackson.rl.polish import paid_environment, polishes, residual_learning, sharper
+from robojackson.rl.training import _warn_of_short_budget
 from robojackson.robot.model import Robot
 
 
@@ -108,3 +113,26 @@ def test_a_narrower_bell_that_is_given_stays() -> None:
 
 def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:
     assert not polishes(configured(), robot, replace(sway, cyclic=False), 1.0)
+
+
+def test_a_training_pays_narrower_bells_where_it_polishes_alone(
+    fed: Robot, sway: ReferenceMotion
+) -> None:
+    ending, named = replace(sway, cyclic=False), configured(**{"tqc.preset": "polish"})
+    usual = configured().environment
+    assert paid_environment(configured(), fed, ending, np.nan) == sharper(usual) != usual
+    assert paid_environment(named, fed, ending, np.nan) == sharper(usual)
+    assert paid_environment(configured(polish="no"), fed, ending, np.nan) == usual
+
+
+@pytest.mark.medium
+def test_the_reward_audit_of_a_polish_is_of_the_reward_that_its_policy_records(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    tqc = {"preset": "polish", "n_envs": 2, "steps_per_round": 4, "buffer": 1000, "warmup": 500}
+    config = configured(steps=8, tqc=tqc)
+    trained = policy_training.train_policy(sway, robot, config=config, force=True, out=tmp_path)
+    paid = fact(trained.policy, "environment", TrackConfig)
+    assert trained.reward_audit == audit_record(audit_both_readings(robot, sway, paid))
+    wider = audit_record(audit_both_readings(robot, sway, config.environment))
+    assert trained.reward_audit["track"]["statue"] < wider["track"]["statue"]
