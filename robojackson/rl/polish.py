@@ -105,8 +105,8 @@ def residual_learning(
     if not polishes(config, robot, reference, held):
         return config.tqc
     log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
-    preset, usual = dict(PRESETS["polish"]), TqcConfig()
+    preset = dict(PRESETS["polish"])
     if control_of(config.track).root_state == "estimated":
         preset["action_penalty"] = ESTIMATED_PENALTY
-    unset = {n: x for n, x in preset.items() if getattr(config.tqc, n) == getattr(usual, n)}
+    unset = {name: x for name, x in preset.items() if getattr(config.tqc, name) is None}
     return replace(config.tqc, **unset)

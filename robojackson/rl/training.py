@@ -81,7 +81,7 @@ def train_policy(
     if networks is not None:
         started = chosen(networks, config.start_critics)
         if not (tqc.gsde and config.trainer == "sb3"):  # whose noise has no such head
-            started = with_exploration(started, tqc.log_std_init)
+            started = with_exploration(started, tqc.actor_start.log_std_init)
         trainer.start_from(started.tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
@@ -123,18 +123,19 @@ def _choice(
     """Return what a polish is written by: the policy or, if that holds more, the feedback alone."""
     motions, threads = motions_of(reference), core.config.threads
     disturbed = config.track.random != RandomConfig()
-    if not tqc.zero_init or len(motions) > 1 or disturbed:
+    if not tqc.actor_start.zero_init or len(motions) > 1 or disturbed:
         return as_trained
     return partial(better_of, reference=motions[0], robot=robot, clip=core.clip, threads=threads)
 
 
 def _warn_of_short_budget(tqc: TqcConfig, steps: int | None) -> None:
     """Log a warning where the actor would never learn."""
-    if steps is not None and 0 < tqc.burn_in >= steps:
+    burn_in = tqc.actor_start.burn_in
+    if steps is not None and 0 < burn_in >= steps:
         log.warning(
             "the critics learn alone for %s transitions (tqc.burn_in) and the budget is %s: the "
             "policy stays as it begins",
-            f"{tqc.burn_in:,}",
+            f"{burn_in:,}",
             f"{steps:,}",
         )
 
