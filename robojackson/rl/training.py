@@ -21,9 +21,9 @@ from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.polish_choice import BESIDE, better_of
 from robojackson.rl.policy import load_policy
-from robojackson.rl.policy_facts import require_same_law
 from robojackson.rl.polish import held_alone, paid_environment, residual_learning
 from robojackson.rl.pretrained import pretrained
+from robojackson.rl.start_law import require_same_law
 from robojackson.rl.tqc.network_arrays import (
     Networks,
     chosen,
@@ -152,8 +152,7 @@ def _fitting(
             f"start {config.start!r} observes {kind} and this training "
             f"{config.track.observation}, in another order: --set track.observation={kind}"
         )
-    if networks.is_policy:
-        require_same_law(networks, core.sim.control, robot, config.start)
+    require_same_law(networks, core.sim.control, robot, config.start)
     seen = core.actor_size if networks.is_policy else core.observation_size
     found = (networks.observation_size, networks.action_size)
     needed = (seen, core.action_size)
