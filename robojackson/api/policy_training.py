@@ -29,7 +29,7 @@ from robojackson.pipeline.yaml_loader import load, refusal
 from robojackson.retarget.scorecard_gate import check, scorecard_record
 from robojackson.rl import training
 from robojackson.rl.checkpoint_folder import newest_checkpoint
-from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainConfig
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
 from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import load_policy
@@ -138,10 +138,15 @@ def _trained(
         if resumes := newest_checkpoint(folder) is not None:
             Task.of(motion, robot).require_own(folder, config)
         rows = EpisodeLog(files, labels, resumes=resumes)
-        audit = audit_record(audit_both_readings(robot, motion, config.environment))
-        hooks.audited(audit)
+        audit: dict[str, dict[str, float]] = {}
+
+        def paying(environment: TrackConfig | PaperConfig) -> None:
+            audit.update(audit_record(audit_both_readings(robot, motion, environment)))
+            hooks.audited(audit)
+            hooks.paying(environment)
+
         try:
-            joined = _joined(hooks, rows, report)
+            joined = replace(_joined(hooks, rows, report), paying=paying)
             result = training.train_policy(motion, robot, config, folder, joined)
         finally:
             if len(rows):

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, get_args
 
@@ -27,8 +27,6 @@ OTHER_PATH = (
     "the policy was trained on top of feedback along another path than this machine has found: "
     "copy the folder feedback of the store in which it was trained, or train it here"
 )
-LAW = ("law", "feedback", "feedforward", "action_factor", "residual", "arm_residual")
-"""Numbers of a control law that say what an action does."""
 SAME_PATH_RAD = 0.02
 """Largest difference of a hinge at which a path is the same."""
 
@@ -99,30 +97,6 @@ def networks_sha256(policy: Policy) -> str:
     return digest.hexdigest()
 
 
-def require_same_law(networks: Networks, control: ControlConfig, robot: Robot, start: str) -> None:
-    """Refuse a policy as the start of a training in which its actions would mean something else.
-
-    Args:
-        networks: The policy's actor.
-        control: Control law of the training, with every number.
-        start: How the training names it.
-
-    Raises:
-        BadPolicy: another robot, or another control law.
-    """
-    trained_for = networks.facts.get("robot")
-    if trained_for != robot.description.name:
-        raise BadPolicy(
-            f"start {start!r} was trained for robot {trained_for!r}, not for "
-            f"{robot.description.name!r}"
-        )
-    law, now = recorded_law(networks), asdict(control)
-    apart = [name for name in LAW if law.get(name) not in (None, now[name])]
-    if apart:
-        given = " ".join(f"--set track.control.{name}={law[name]}" for name in apart)
-        raise BadPolicy(f"start {start!r} has another control law: {given}")
-
-
 def policy_control(policy: Policy, robot: Robot) -> ControlConfig:
     """Return the control law that a policy was trained with.
 
@@ -184,7 +158,7 @@ def _require_same_actuation(policy: Policy, robot: Robot, control: ControlConfig
         )
 
 
-def fact(policy: Policy, name: str, kind: type[T]) -> T:
+def fact(policy: Policy | Networks, name: str, kind: type[T]) -> T:
     """Return a configuration from a policy's file.
 
     Raises:

@@ -9,26 +9,21 @@ tables.
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from robojackson.errors import BadConfiguration, BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of
 from robojackson.rl.checkpoint_folder import NETWORKS, newest_checkpoint, require_free
-from robojackson.rl.config.tqc_config import PRESETS
 from robojackson.rl.config.track_config import RandomConfig
-from robojackson.rl.config.train_config import PaperConfig, TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingVecEnv
 from robojackson.rl.evaluation.polish_choice import BESIDE, better_of
-from robojackson.rl.feedback.cached_feedback import feedback_of
-from robojackson.rl.feedback.sampled_regulator import ENOUGH
-from robojackson.rl.modes.track_mode import control_of, is_fed
 from robojackson.rl.policy import load_policy
-from robojackson.rl.policy_facts import require_same_law
+from robojackson.rl.polish import held_alone, paid_environment, residual_learning
 from robojackson.rl.pretrained import pretrained
-from robojackson.rl.sim.motors import feedback_path
+from robojackson.rl.start_law import require_same_law
 from robojackson.rl.tqc.network_arrays import (
     Networks,
     chosen,
@@ -47,12 +42,6 @@ from robojackson.robot.model import Robot
 __all__ = ["Hooks", "TrainResult", "train_policy"]
 
 log = logging.getLogger(__name__)
-POLISHED = ENOUGH
-"""Share of the starts from which the feedback alone holds a motion that repeats, for it to be
-polished; where a path holds so many, no better one is searched."""
-ESTIMATED_PENALTY = 0.03
-"""Cost of actions of a polish on feedback from an estimated root, which alone holds less: a policy
-has more to correct (docs/learning_g1.md, "On its own measurements")."""
 
 
 def train_policy(
@@ -76,9 +65,9 @@ def train_policy(
     networks = _start(config, robot, out)
     out.mkdir(parents=True, exist_ok=True)
     held = held_alone(config, robot, reference)
-    environment, of_tqc = config.environment, (config.tqc.n_envs, config.seed)
-    if config.tqc.preset == "polish" or polishes(config, robot, reference, held):
-        environment = sharper(environment)
+    environment = paid_environment(config, robot, reference, held)
+    hooks.paying(environment)
+    of_tqc = (config.tqc.n_envs, config.seed)
     core = TrackingCore(robot, reference, environment, *of_tqc, hooks.rewards)
     run = Run(out, config, core, Task.of(reference, robot), hooks)
     env = TrackingVecEnv(core, run.episodes)
@@ -92,7 +81,7 @@ def train_policy(
     if networks is not None:
         started = chosen(networks, config.start_critics)
         if not (tqc.gsde and config.trainer == "sb3"):  # whose noise has no such head
-            started = with_exploration(started, tqc.log_std_init)
+            started = with_exploration(started, tqc.actor_start.log_std_init)
         trainer.start_from(started.tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
@@ -134,88 +123,21 @@ def _choice(
     """Return what a polish is written by: the policy or, if that holds more, the feedback alone."""
     motions, threads = motions_of(reference), core.config.threads
     disturbed = config.track.random != RandomConfig()
-    if not tqc.zero_init or len(motions) > 1 or disturbed:
+    if not tqc.actor_start.zero_init or len(motions) > 1 or disturbed:
         return as_trained
     return partial(better_of, reference=motions[0], robot=robot, clip=core.clip, threads=threads)
 
 
-def residual_learning(
-    config: TrainConfig,
-    robot: Robot,
-    reference: ReferenceMotion | Sequence[ReferenceMotion],
-    held: float,
-) -> TqcConfig:
-    """Return TQC's configuration: that of `polish` where the feedback dances by itself, else the
-    given one.
-
-    A motion that repeats is learnt better from falls, by actions that are random at first, unless
-    the feedback holds nine tenths; they destroy what it holds of one that ends
-    (docs/learning_g1.md).
-
-    Args:
-        config: The training.
-        robot: The robot.
-        reference: Its motion or motions.
-        held: Share of the starts from which the feedback alone keeps robots upright, 0..1, or NaN.
-    """
-    if not polishes(config, robot, reference, held):
-        return config.tqc
-    log.info("improving what the feedback alone does (train.polish=no: begin with random actions)")
-    preset, usual = dict(PRESETS["polish"]), TqcConfig()
-    if control_of(config.track).root_state == "estimated":
-        preset["action_penalty"] = ESTIMATED_PENALTY
-    unset = {n: x for n, x in preset.items() if getattr(config.tqc, n) == getattr(usual, n)}
-    return replace(config.tqc, **unset)
-
-
 def _warn_of_short_budget(tqc: TqcConfig, steps: int | None) -> None:
     """Log a warning where the actor would never learn."""
-    if steps is not None and 0 < tqc.burn_in >= steps:
+    burn_in = tqc.actor_start.burn_in
+    if steps is not None and 0 < burn_in >= steps:
         log.warning(
             "the critics learn alone for %s transitions (tqc.burn_in) and the budget is %s: the "
             "policy stays as it begins",
-            f"{tqc.burn_in:,}",
+            f"{burn_in:,}",
             f"{steps:,}",
         )
-
-
-def held_alone(
-    config: TrainConfig, robot: Robot, reference: ReferenceMotion | Sequence[ReferenceMotion]
-) -> float:
-    """Return the share of the starts from which the feedback of a training alone keeps robots
-    upright, 0..1; NaN where it has none, or that is unknown."""
-    if not is_fed(config, robot.description):
-        return float("nan")
-    law = feedback_of(robot, motions_of(reference), control_of(config.track))
-    return float("nan") if law is None else law.held
-
-
-def sharper(environment: TrackConfig | PaperConfig) -> TrackConfig | PaperConfig:
-    """Return the environment of a polish, whose narrower bells pay more, and for the last
-    millimetres: where the feedback already dances, the usual ones are nearly all paid
-    (docs/learning_g1.md, "Narrower bells")."""
-    if not isinstance(environment, TrackConfig):
-        return environment
-    reward = environment.reward
-    narrow = min(reward.narrow, reward.polished_narrow)
-    fine = max(reward.fine, reward.polished_fine)
-    return replace(environment, reward=replace(reward, narrow=narrow, fine=fine))
-
-
-def polishes(
-    config: TrainConfig,
-    robot: Robot,
-    reference: ReferenceMotion | Sequence[ReferenceMotion],
-    held: float,
-) -> bool:
-    """Return whether a training begins with what the feedback alone does (`residual_learning`)."""
-    track, motions = config.track, motions_of(reference)
-    usual = config.trainer == "sbx" and config.start == SCRATCH
-    path = feedback_path(robot, control_of(track))
-    fed = is_fed(config, robot.description) and path == "sampled"
-    better = len(motions) == 1 and (held >= POLISHED or not motions[0].cyclic)
-    chosen = config.polish == "auto" and config.tqc.preset == "dance" and not track.random.pushes
-    return usual and chosen and fed and better
 
 
 def _fitting(
@@ -230,8 +152,7 @@ def _fitting(
             f"start {config.start!r} observes {kind} and this training "
             f"{config.track.observation}, in another order: --set track.observation={kind}"
         )
-    if networks.is_policy:
-        require_same_law(networks, core.sim.control, robot, config.start)
+    require_same_law(networks, core.sim.control, robot, config.start)
     seen = core.actor_size if networks.is_policy else core.observation_size
     found = (networks.observation_size, networks.action_size)
     needed = (seen, core.action_size)

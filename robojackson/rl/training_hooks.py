@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from robojackson.rl.config.train_config import PaperConfig, TrackConfig
 from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import Policy
 
@@ -33,6 +34,8 @@ class Hooks:
         setup: Name of the configuration, written into the policy's file.
         audited: Called once at the beginning with the rewards of bodies that do not dance
             (`evaluation.reward_audit.audit_record`).
+        paying: Called once at the beginning with the environment that pays the training; that of
+            a polish is not the configuration's (`polish.paid_environment`).
         rewards: Further reward terms by name.
     """
 
@@ -43,4 +46,5 @@ class Hooks:
     stop: Callable[[], bool] = lambda: False
     setup: str = ""
     audited: Callable[[Mapping[str, Mapping[str, float]]], None] = lambda audit: None
+    paying: Callable[[TrackConfig | PaperConfig], None] = lambda environment: None
     rewards: Mapping[str, RewardFunction] = field(default_factory=dict)

@@ -10,6 +10,7 @@ from typing import Any
 from robojackson.errors import BadConfiguration
 from robojackson.motion.reference_motion import ReferenceMotion, motions_of, poses_sha256
 from robojackson.rl.checkpoint_folder import newest_checkpoint, restoring
+from robojackson.rl.config.tqc_config import PRESETS, ActorStart
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.modes.track_mode import control_of
 from robojackson.robot.description import description_sha256
@@ -27,6 +28,8 @@ OLDER_TRACK = {"differences": False}
 """Numbers of the environment from before they could be chosen."""
 OLDER_REWARD = {"polished_fine": 0.5, "polished_narrow": 0.35}
 """Numbers of the reward from before they could be chosen."""
+NOT_GIVEN = "not_given"
+"""Key of checkpoints in which what was not given is null; older ones hold its default."""
 SHOWN = 4
 """Differences that a message names at most."""
 LONGEST = 60
@@ -72,7 +75,8 @@ class Task:
         fields["track"]["control"] = asdict(control_of(config.track))
         for free in NOT_OF_THE_RUN:
             del fields[free]
-        result: dict[str, object] = json.loads(json.dumps(fields | {"task": asdict(self)}))
+        fields |= {"task": asdict(self), NOT_GIVEN: None}
+        result: dict[str, object] = json.loads(json.dumps(fields))
         return result
 
     def require_own(self, out: Path, config: TrainConfig) -> None:
@@ -145,7 +149,16 @@ def completed_settings(kept: Mapping[str, object]) -> dict[str, object]:
         "random": {**OLDER_RANDOM, **track.get("random", {})},
         "reward": {**OLDER_REWARD, **track.get("reward", {})},
     }
-    return {**kept, "tqc": {**OLDER_TQC, **tqc}, "track": {**OLDER_TRACK, **track, **sections}}
+    tqc = {**OLDER_TQC, **(tqc if NOT_GIVEN in kept else _older_start(tqc))}
+    return {**kept, "tqc": tqc, "track": {**OLDER_TRACK, **track, **sections}}
+
+
+def _older_start(tqc: Mapping[str, Any]) -> dict[str, object]:
+    """Return the numbers of TQC of a checkpoint from before zeros could be given: what equals its
+    default counted as not given."""
+    usual, named = asdict(ActorStart()), PRESETS.get(tqc.get("preset", ""), {})
+    unset = {name for name, value in usual.items() if name not in named and tqc.get(name) == value}
+    return {name: None if name in unset else value for name, value in tqc.items()}
 
 
 def _older_control(track: Mapping[str, Any]) -> dict[str, object]:

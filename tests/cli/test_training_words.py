@@ -12,6 +12,7 @@ from robojackson.cli.training_words import train_after, train_longer, train_this
 from robojackson.motion.reference_motion import poses_sha256
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import Policy
+from robojackson.rl.training_task import NOT_GIVEN
 from tests.fixtures.robots import robot_motion
 
 USUAL = TrainConfig()
@@ -19,7 +20,8 @@ USUAL = TrainConfig()
 
 def folder_of(config: TrainConfig, tmp_path: Path) -> Path:
     (tmp_path / "checkpoint").mkdir()
-    facts = {"configuration": {**asdict(config), "task": {"robot": "humanoid"}}}
+    settings = {**asdict(config), NOT_GIVEN: None, "task": {"robot": "humanoid"}}
+    facts = {"configuration": settings}
     (tmp_path / "checkpoint" / "run.json").write_text(json.dumps(facts))
     return tmp_path
 
@@ -30,6 +32,7 @@ def folder_of(config: TrainConfig, tmp_path: Path) -> Path:
         (USUAL, ""),
         (replace(USUAL, seed=3), " --set=seed=3"),
         (replace(USUAL, tqc=replace(USUAL.tqc, warmup=200)), " --set=tqc.warmup=200"),
+        (replace(USUAL, tqc=replace(USUAL.tqc, burn_in=0)), " --set=tqc.burn_in=0"),
         (replace(USUAL, trainer="sb3"), " --set=trainer=sb3"),
     ],
 )
@@ -45,7 +48,8 @@ def test_a_checkpoint_from_before_a_setting_insists_on_that_of_then(tmp_path: Pa
     folder = folder_of(USUAL, tmp_path)
     file = folder / "checkpoint" / "run.json"
     kept = json.loads(file.read_text())
-    del kept["configuration"]["tqc"]["n_steps"]
+    del kept["configuration"]["tqc"]["n_steps"], kept["configuration"][NOT_GIVEN]
+    kept["configuration"]["tqc"]["burn_in"] = 0
     file.write_text(json.dumps(kept))
     assert train_longer(Path("r"), folder, 20).endswith("--minutes 20 --set=tqc.n_steps=1")
 

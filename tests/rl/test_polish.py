@@ -1,16 +1,23 @@
 """When a training begins with what the feedback alone does."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
+from robojackson.api import policy_training
+from robojackson.files.json_types import to_json_types
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.pipeline.yaml_loader import load
-from robojackson.rl.config.tqc_config import PRESETS
-from robojackson.rl.config.train_config import TrackConfig, TrainConfig
-from robojackson.rl.training import _warn_of_short_budget, polishes, residual_learning, sharper
+from robojackson.rl.config.tqc_config import PRESETS, ActorStart
+from robojackson.rl.config.train_config import TqcConfig, TrackConfig, TrainConfig
+from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
+from robojackson.rl.policy_facts import fact
+from robojackson.rl.polish import paid_environment, polishes, residual_learning, sharper
+from robojackson.rl.training import _warn_of_short_budget
 from robojackson.robot.model import Robot
 
 
@@ -43,6 +50,43 @@ def test_what_is_set_by_hand_goes_before_the_preset_of_a_polish(
     tqc = residual_learning(configured(**own), fed, ending, 0.5)
     assert (tqc.burn_in, tqc.action_penalty) == (40, 0.01)
     assert tqc.log_std_init == PRESETS["polish"]["log_std_init"]
+
+
+def by_hand(name: str, value: object, tmp_path: Path) -> TrainConfig:
+    """Return a training of which one number is set by `--set`."""
+    return configured(**{f"tqc.{name}": yaml.safe_dump(value)})
+
+
+def in_python(name: str, value: object, tmp_path: Path) -> TrainConfig:
+    """Return a training of which one number is set in Python."""
+    return replace(configured(), tqc=TqcConfig(**{name: value}))  # type: ignore[arg-type]
+
+
+def written(name: str, value: object, tmp_path: Path) -> TrainConfig:
+    """Return a training whose whole configuration was written and read, as a pass does it."""
+    file = tmp_path / "setup.yaml"
+    file.write_text(yaml.safe_dump(to_json_types(by_hand(name, value, tmp_path))))
+    return load(TrainConfig, str(file))
+
+
+@pytest.mark.parametrize("way", [by_hand, in_python, written])
+@pytest.mark.parametrize(("name", "value"), asdict(ActorStart()).items())
+def test_a_default_that_is_set_by_hand_goes_before_the_preset_of_a_polish(
+    fed: Robot, sway: ReferenceMotion, tmp_path: Path,
+    name: str, value: object, way: Callable[[str, object, Path], TrainConfig],
+) -> None:  # fmt: skip
+    config = way(name, value, tmp_path)
+    start = residual_learning(config, fed, replace(sway, cyclic=False), 0.5).actor_start
+    assert asdict(start) == {**PRESETS["polish"], name: value}
+
+
+def test_a_configuration_that_was_written_is_polished_as_the_one_before(
+    fed: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    file = tmp_path / "setup.yaml"
+    file.write_text(yaml.safe_dump(to_json_types(configured())))
+    tqc = residual_learning(load(TrainConfig, str(file)), fed, replace(sway, cyclic=False), 0.5)
+    assert asdict(tqc.actor_start) == PRESETS["polish"]
 
 
 @pytest.mark.parametrize(("steps", "is_short"), [(40, True), (41, False), (None, False)])
@@ -108,3 +152,26 @@ def test_a_narrower_bell_that_is_given_stays() -> None:
 
 def test_a_robot_without_feedback_is_not(robot: Robot, sway: ReferenceMotion) -> None:
     assert not polishes(configured(), robot, replace(sway, cyclic=False), 1.0)
+
+
+def test_a_training_pays_narrower_bells_where_it_polishes_alone(
+    fed: Robot, sway: ReferenceMotion
+) -> None:
+    ending, named = replace(sway, cyclic=False), configured(**{"tqc.preset": "polish"})
+    usual = configured().environment
+    assert paid_environment(configured(), fed, ending, np.nan) == sharper(usual) != usual
+    assert paid_environment(named, fed, ending, np.nan) == sharper(usual)
+    assert paid_environment(configured(polish="no"), fed, ending, np.nan) == usual
+
+
+@pytest.mark.medium
+def test_the_reward_audit_of_a_polish_is_of_the_reward_that_its_policy_records(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    tqc = {"preset": "polish", "n_envs": 2, "steps_per_round": 4, "buffer": 1000, "warmup": 500}
+    config = configured(steps=8, tqc=tqc)
+    trained = policy_training.train_policy(sway, robot, config=config, force=True, out=tmp_path)
+    paid = fact(trained.policy, "environment", TrackConfig)
+    assert trained.reward_audit == audit_record(audit_both_readings(robot, sway, paid))
+    wider = audit_record(audit_both_readings(robot, sway, config.environment))
+    assert trained.reward_audit["track"]["statue"] < wider["track"]["statue"]

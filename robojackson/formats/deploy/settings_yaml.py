@@ -34,12 +34,15 @@ def settings_yaml(policy: DeployedPolicy) -> bytes:
 def polished_yaml(policy: DeployedPolicy, feedback: DeployedFeedback, sha256: str) -> bytes:
     """Return the content of the file for a network on top of feedback; arguments of the two."""
     network = _of_network(policy)
-    network["limits"] |= _reach(feedback, policy.action_scale)
+    most = feedback.limit + policy.action_scale
+    network["limits"] |= _reach(policy.machine, feedback.targets, most)
     return _text(network | _of_feedback(feedback, sha256))
 
 
 def _of_network(policy: DeployedPolicy) -> Settings:
     machine = _of_machine(policy.machine)
+    targets = np.asarray(policy.reference.qpos, float)[:, 7:] + policy.lead
+    machine["limits"] |= _reach(policy.machine, targets, policy.action_scale)
     scale = _numbers(policy.action_scale)
     action = {
         "clip": None,
@@ -70,7 +73,7 @@ def feedback_yaml(feedback: DeployedFeedback, sha256: str) -> bytes:
         sha256: Digest of feedback.npz.
     """
     machine = _of_machine(feedback.machine)
-    machine["limits"] |= _reach(feedback)
+    machine["limits"] |= _reach(feedback.machine, feedback.targets, feedback.limit)
     return _text(machine | _of_feedback(feedback, sha256))
 
 
@@ -86,12 +89,18 @@ def _of_feedback(feedback: DeployedFeedback, sha256: str) -> Settings:
     }
 
 
-def _reach(feedback: DeployedFeedback, action: np.ndarray | float = 0.0) -> dict[str, list[float]]:
-    """Return the limits of the targets: the joints' ranges, and beyond them what the feedback and
-    the largest action, rad, may ask for. A target beyond a joint's end is a torque there, whose
-    limit holds; without it a robot with bent knees or ankles cannot be caught."""
-    own, most = limits(feedback.machine), feedback.limit + action
-    lowest, highest = feedback.targets.min(0) - most, feedback.targets.max(0) + most
+def _reach(
+    machine: DeployedMachine, targets: np.ndarray, most: np.ndarray
+) -> dict[str, list[float]]:
+    """Return the limits of the targets: the joints' ranges, and beyond them what the driver of the
+    robot may ask for. A target beyond a joint's end is a torque there, whose limit holds; without
+    it a robot with bent knees or ankles cannot be caught, and gets less than the feed-forward.
+
+    Args:
+        targets: The motion's own, with their lead, rad (S, J).
+        most: Largest move of a target by feedback and network, rad (J).
+    """
+    own, lowest, highest = limits(machine), targets.min(0) - most, targets.max(0) + most
     return {
         "lower": _numbers(np.minimum(own["lower"], lowest)),
         "upper": _numbers(np.maximum(own["upper"], highest)),
@@ -123,7 +132,7 @@ def _of_machine(machine: DeployedMachine) -> Settings:
 
 
 def limits(machine: DeployedMachine) -> dict[str, list[float]]:
-    """Return the limits of the targets, rad, of torques and of speeds."""
+    """Return the ranges of the joints, rad, and the limits of torques and of speeds."""
     low, high = machine.model.jnt_range[1:].T
     free = machine.model.jnt_limited[1:] == 0
     return {

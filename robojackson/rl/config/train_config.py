@@ -129,7 +129,8 @@ class TrainConfig:
 
     @model_validator(mode="after")
     def _residual_learning(self) -> "TrainConfig":
-        given = (self.tqc.zero_init, self.tqc.burn_in, self.tqc.action_penalty)
+        start = self.tqc.actor_start
+        given = (start.zero_init, start.burn_in, start.action_penalty)
         if self.trainer == "sb3" and any(given):
             raise ConflictingValues(
                 "tqc.zero_init, burn_in and action_penalty (of preset polish or setup "

@@ -160,7 +160,11 @@ def regulator_of(
 
 
 def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> str:
-    """Return a digest of the gains' inputs, as a name."""
+    """Return a digest of the gains' inputs, as a name.
+
+    The digest of the poses is that of policies, and leaves out how far a cycle travels and the
+    speeds, on which the gains at its seam and the nominal states depend.
+    """
     law = resolved(replace(control, feedback=0.0), robot)
     named = {name: getattr(law, name) for name in ("substeps", "feedforward", "feedback_path")}
     motors = actuation_facts(robot, control)
@@ -172,6 +176,8 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode())
+    for moved in (motion.cycle_offset, motion.qvel):
+        digest.update(np.ascontiguousarray(moved, float).tobytes())
     model = robot.model
     for name in VARIED:  # a varied robot has the same name and file
         digest.update(np.ascontiguousarray(getattr(model, name)).tobytes())

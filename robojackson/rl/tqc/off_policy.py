@@ -36,7 +36,7 @@ def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
         "policy_kwargs": {
             "n_critics": config.critics,
             "n_quantiles": config.quantiles,
-            "log_std_init": config.log_std_init,
+            "log_std_init": config.actor_start.log_std_init,
             "net_arch": {"pi": list(config.actor), "qf": list(config.critic)},
         },
         "seed": seed,

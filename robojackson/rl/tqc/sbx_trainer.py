@@ -117,14 +117,15 @@ class SbxTrainer(OffPolicyTrainer):
         given["policy_kwargs"] |= {"layer_norm": config.layer_norm}
         model = OverlappedTQC(env=env, policy_delay=config.policy_delay, **given)
         model.warmup, model.seen = config.warmup, seen
-        model.burn_in, model.action_penalty = config.burn_in, config.action_penalty
+        start = config.actor_start
+        model.burn_in, model.action_penalty = start.burn_in, start.action_penalty
         model.ent_coef_state = jax.tree_util.tree_map(_strong, model.ent_coef_state)
         if config.gsde:
             log.warning("trainer sbx has no gSDE: it explores with plain Gaussian noise")
-        if config.log_std_init or config.zero_init:
-            _start_heads(model, config.log_std_init, config.zero_init)
+        if start.log_std_init or start.zero_init:
+            _start_heads(model, start.log_std_init, start.zero_init)
         super().__init__(model, {"noise": model.noise})
-        if config.zero_init:
+        if start.zero_init:
             self._act_at_once()
 
     def learn(self, callback: BaseCallback) -> None:

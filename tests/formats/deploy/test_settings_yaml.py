@@ -12,6 +12,9 @@ import yaml
 from robojackson.formats.deploy.deployed_machine import places_in_mjcf
 from robojackson.formats.deploy.settings_yaml import UNITREE_TERMS
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.rl.feedback.driven_clip import driven_clip
+from robojackson.rl.policy_facts import policy_control
+from robojackson.rl.sim.simulation import Simulation
 from robojackson.robot.model import load_robot
 from tests.fixtures.robots import G1
 from tests.formats.deploy.conftest import Pack
@@ -65,11 +68,34 @@ def test_gains_limits_and_scale_are_the_robots_hinge_by_hinge(pack: Pack) -> Non
     np.testing.assert_allclose(found["damping"], own.damping)
     np.testing.assert_allclose(found["limits"]["torque"], own.torque_limit)
     np.testing.assert_allclose(found["limits"]["speed"], own.speed_limit)
-    np.testing.assert_allclose(found["limits"]["lower"], robot.lower)
-    np.testing.assert_allclose(found["limits"]["upper"], robot.upper)
     np.testing.assert_allclose(found["action_scale"], own.action_scale)
     np.testing.assert_allclose(found["default_joint_pos"], robot.standing[7:])
     assert found["step_dt"] == pack.reference.dt
+
+
+def aimed(pack: Pack) -> np.ndarray:
+    """Return the targets of a pack's motion as its training has them, hinge by hinge."""
+    control = policy_control(pack.policy, pack.robot)
+    sim = Simulation(pack.robot, control, len(pack.reference))
+    clip = driven_clip(pack.robot, pack.reference, control)
+    angles = sim.reference_angles(clip.at(np.arange(len(pack.reference))))
+    return angles[:, np.argsort(sim.motors.hinge)]
+
+
+@pytest.mark.parametrize("which", ["pack", "hipped"])
+def test_no_target_of_motion_and_network_lies_outside_the_limits(
+    which: str, request: pytest.FixtureRequest
+) -> None:
+    """The targets of a motion lead it by its torques, beyond the ends of joints (`hipped`)."""
+    pack: Pack = request.getfixturevalue(which)
+    robot, found, targets = pack.robot, settings(pack)["limits"], aimed(pack)
+    lower, upper = np.array(found["lower"]), np.array(found["upper"])
+    beyond = (targets < robot.lower) | (targets > robot.upper)
+    assert beyond.any() == (which == "hipped")
+    full = robot.actuation.action_scale
+    reached = (targets - full).min(0), (targets + full).max(0)
+    np.testing.assert_allclose(lower, np.minimum(robot.lower, reached[0]), atol=1e-6)
+    np.testing.assert_allclose(upper, np.maximum(robot.upper, reached[1]), atol=1e-6)
 
 
 def test_the_written_robot_falls_as_the_robot_does(pack: Pack) -> None:

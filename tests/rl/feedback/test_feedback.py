@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig, EvaluateConfig, TrackConfig
 from robojackson.rl.evaluation.rollouts import Driver, roll_out
 from robojackson.rl.evaluation.starts import starts_of
@@ -128,6 +128,18 @@ def test_the_log_of_a_search_has_a_line_every_fifteen_seconds(
         "feedback along 12.3 s of motion: sampled path, 50 %, 16 s so far",
         "feedback along 12.3 s of motion: sampled path, 100 %, 32 s so far",
     ]
+
+
+@pytest.mark.parametrize("name", ["cycle_offset", "qvel"])
+def test_motions_of_the_same_poses_that_move_otherwise_have_gains_of_their_own(
+    robot: Robot, sway: ReferenceMotion, name: str
+) -> None:
+    other = dataclasses.replace(sway, **{name: getattr(sway, name) + 0.1})
+    assert poses_sha256(other) == poses_sha256(sway)
+    paths = {cached_feedback._path(robot, motion, FED) for motion in (sway, other)}
+    assert len(paths) == 2
+    again = dataclasses.replace(sway, **{name: np.array(getattr(sway, name))})
+    assert cached_feedback._path(robot, again, FED) in paths
 
 
 def test_gains_are_computed_once_and_again_where_the_file_is_damaged(
