@@ -40,6 +40,11 @@ def test_a_frozen_reference_is_the_one_that_rows_are_measured_on(path: Path) -> 
     require_frozen(path.stem, path)
 
 
+def test_each_row_has_a_frozen_reference() -> None:
+    """Without one, `require_frozen` lets any motion pass."""
+    assert {move.same_as or name for name, move in MOVES.items()} <= set(SPLIT.references)
+
+
 def test_another_reference_is_refused() -> None:
     """A row that is measured on other poses is another row."""
     with pytest.raises(SystemExit, match=r"g1_walk: .* measured on"):
