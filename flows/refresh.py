@@ -89,10 +89,10 @@ async def refresh(
     sweep(store, work=False)
     load(FindConfig, config, overrides)  # before any dance
     chosen = {} if robot is None else {"robot": yaml_text(robot)}
-    later = {**(pipeline_overrides or {}), **chosen}
-    stages = load(PipelineConfig, pipeline, later)
+    stage_overrides = {**(pipeline_overrides or {}), **chosen}
+    stages = load(PipelineConfig, pipeline, stage_overrides)
     dancer = load_robot(describe_robot(stages.robot)).description.name
-    given = (config, overrides or {}, pipeline, later)
+    given = (config, overrides or {}, pipeline, stage_overrides)
     done: dict[str, Facts] = {}
     failed: dict[str, str] = {}
     waiting: list[str] = []

@@ -75,6 +75,7 @@ class PageSettings:
         configuration: Configuration of the pass, as YAML.
         candidates: Clips that were scored, the one that is danced among them.
         longer: Options of `dance` for a longer training.
+        begin_s: Where the clip begins in its video, seconds: advice is about the video.
     """
 
     robot: RobotDescription
@@ -82,6 +83,7 @@ class PageSettings:
     configuration: str = ""
     candidates: tuple[ScoredClip, ...] = ()
     longer: str = ""
+    begin_s: float = 0.0
 
 
 def _models(parameters: Mapping[str, Any]) -> list[str]:
@@ -206,7 +208,7 @@ def _results(
         episodes=_episodes(store, made),
         evaluation=joined_evaluation(store, made),
         evaluations=artifact_tables.read_rows(EVALUATION_RECORD, store, made["evaluations"]),
-        advice=advise(run.track),
+        advice=advise(run.track, settings.begin_s),
         tracker_video=made["tracker_dance"].name if "tracker_dance" in made else None,
         player=shown.player,
         film=shown.film,

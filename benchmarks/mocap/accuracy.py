@@ -44,6 +44,7 @@ GROUPS = {"held_out": HELD_OUT, "rendered": RENDERED[1:], "real": REAL}
 TUNED = {
     "person_cam2": "the prior of swapped sides",
     "dance_a, dance_b, walk": "contact model, pins and ramps",
+    "dance_a, dance_b": "window and least turn of a foot that pivots",
     "all of rendered and real": "weights of gravity and of the refinement, 4 Hz low-pass, focal "
     "length (0.85 of the diagonal), metre (1.05), height of the hips, trust in bone lengths",
     "19 of the network's training clips": "speed of feet along the ray, leash of the root's path",

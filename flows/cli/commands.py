@@ -98,7 +98,6 @@ def dance(
     from flows.search import dance_source
     from flows.search.dance_source import is_on_the_web, load_settings, resolve
     from flows.search.requests import require_findable
-    from robojackson.cli.cards import later
     from robojackson.errors import BadConfiguration
     from robojackson.pipeline.robust_training import robust_dance
     from storage.store import Store
@@ -128,7 +127,7 @@ def dance(
         require_findable(str(source), Store.from_environment())
     prepare(Store.from_environment())
     made = _danced(found or str(source), config, overrides, start, end, settings)
-    return _concluded(made | {"advice": later(made["advice"], start or 0.0)}, settings)
+    return _concluded(made, settings)
 
 
 def _danced(

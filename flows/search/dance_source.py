@@ -79,7 +79,7 @@ def load_settings(config: str, overrides: Mapping[str, Any]) -> "PipelineConfig"
     robot = describe_robot(settings.robot)
     if settings.instant:  # first: there is no use in adding a robot that has none
         require_tracker(robot.name, settings.tracker)
-    require_trainable(load_robot(robot))
+    require_trainable(load_robot(robot), settings.train)
     return settings
 
 

@@ -107,7 +107,7 @@ async def perform(
         announce("motion capture and retargeting")
         moved = to_reference(best.clip, robot, settings)
         if settings.gate:
-            _require_feasible(moved)
+            _require_feasible(moved, best.begin_s)
         shown = page_settings(best, candidates, robot, settings)
         tracked = None
         if tracker is not None:
@@ -122,14 +122,14 @@ async def perform(
         return {**made, **write_page(made, labels.move, best.name, shown, folder)}
 
 
-def _require_feasible(moved: Artifacts) -> None:
+def _require_feasible(moved: Artifacts, begin_s: float) -> None:
     """Apply the gate; a refusal names what in the clip may be the reason."""
     store = Store.from_environment()
     try:
         check(json.loads(store.read(moved["scorecard"].key)))
     except RejectedReference as cause:
-        advice = advise(artifact_tables.read(LandmarkTrack, store, moved["landmarks"]))
-        reasons = [str(each) for each in advice if each.kind in SPOILING]
+        track = artifact_tables.read(LandmarkTrack, store, moved["landmarks"])
+        reasons = [str(each) for each in advise(track, begin_s) if each.kind in SPOILING]
         raise cause.advised(reasons) from None
 
 
@@ -195,7 +195,7 @@ def conclude(
         "scorecard": json.loads(store.read(made["scorecard"].key)),
         "evaluation": summary,
         "beats": beats,
-        "advice": [each.record for each in advise(track)],
+        "advice": [each.record for each in advise(track, choose(candidates).begin_s)],
         "artifacts": {name: store.address(artifact.key) for name, artifact in made.items()},
     }
 

@@ -35,12 +35,14 @@ class Candidate:
         name: Name of the file.
         clip: Its video and what is known of it, as `probe_video` left them.
         stability, score: Stability and score of Algorithm 1, as artifact and as value.
+        begin_s: Where the clip begins in its video, seconds.
     """
 
     name: str
     clip: dict[str, Artifact]
     stability: Artifact
     score: Stability
+    begin_s: float = 0.0
 
 
 def score_all(
@@ -64,7 +66,9 @@ def score_all(
     scores = _each(score_stability, tracks, lambda given: (given[1], settings.stability))
     store = Store.from_environment()
     return [
-        Candidate(path.name, clip, score, artifact_tables.read(Stability, store, score))
+        Candidate(
+            path.name, clip, score, artifact_tables.read(Stability, store, score), start_s or 0.0
+        )
         for (((path, _), clip), _), score in scores
     ]
 
@@ -111,6 +115,7 @@ def page_settings(
             for each in candidates
         ),
         longer_options(settings),
+        best.begin_s,
     )
 
 

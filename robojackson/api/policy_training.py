@@ -106,7 +106,7 @@ def train_policy(
     settings = _configured(config, setup, steps, minutes, seed)
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
-    require_trainable(machine)
+    require_trainable(machine, settings)
     if not force:
         check(scorecard_record(motion))
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))

@@ -101,14 +101,12 @@ def mocap(
     log_to_stderr()
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
-    with video_range(video, second, out, (start, end), config, overrides) as shown:
+    with video_range(video, second, out, (start, end), config, overrides) as clip:
         if people:
-            data, lines = list_people(shown, out, config, overrides, start)
+            data, lines = list_people(clip, out, config, overrides, start)
             return CommandResult(data, text=lines)
-        made = stages.mocap(shown, out, config, overrides, hypotheses, second)
-        made = mocap_card.with_verdict(
-            made | draw_mocap(shown, out, config, overrides, film), start
-        )
+        made = stages.mocap(clip, out, config, overrides, hypotheses, second)
+        made = mocap_card.with_verdict(made | draw_mocap(clip, out, config, overrides, film), start)
     return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))
 
 

@@ -71,19 +71,6 @@ def score_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
-def later(advice: Sequence[Answer], start_s: float) -> list[dict[str, object]]:
-    """Return records of advice about a clip as those about the video in which it begins at a
-    moment, seconds."""
-    from robojackson.clips.quality.advice import Advice
-
-    return [
-        Advice(each["kind"], each["value"], each["limit"], each.get("range_s"))
-        .later(start_s)
-        .record
-        for each in advice
-    ]
-
-
 def advice_lines(answer: Answer) -> list[str]:
     """Return advice for filming the clip again, a line each."""
     return [f"advice    {each['words']}" for each in answer.get("advice", ())]

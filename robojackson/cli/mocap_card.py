@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from robojackson.cli.cards import Answer, advice_lines, closing, later
-from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN
+from robojackson.cli.cards import Answer, advice_lines, closing
+from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN, Advice
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
@@ -21,6 +21,8 @@ RISE = 0.5
 """Vertical part of a trunk's direction below which it lies, and hangs below its negative."""
 PARTS = ("weak_s", "filled_s")
 """Lists of stretches of a clip, seconds."""
+ADVICE = ("kind", "value", "limit", "range_s")
+"""Fields of a record of advice."""
 TURNED = 0.5
 """Share of frames in which a person hangs or lies from which the picture may be turned."""
 
@@ -88,7 +90,12 @@ def with_verdict(answer: dict[str, object], start_s: float | None = None) -> dic
 
 
 def _in_the_video(answer: Answer, start_s: float) -> dict[str, object]:
-    shifted: dict[str, object] = {"advice": later(answer["advice"], start_s)}
+    shifted: dict[str, object] = {
+        "advice": [
+            Advice(*(each.get(key) for key in ADVICE)).later(start_s).record
+            for each in answer["advice"]
+        ]
+    }
     if (found := answer.get("reprojection")) is not None:
         parts = {key: [[start_s + s for s in part] for part in found[key]] for key in PARTS}
         shifted["reprojection"] = {**found, **parts}

@@ -7,7 +7,7 @@ as those of SB3, cannot be compared.
 
 import json
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -21,10 +21,8 @@ from robojackson.robot.model import Robot
 
 log = logging.getLogger(__name__)
 
-NUMBERS = (
-    *("law", "feedback", "feedforward", "action_factor", "residual", "arm_residual"),
-    *("stiffness", "damping"),
-)
+ACTIONS = ("law", "feedback", "feedforward", "action_factor", "residual", "arm_residual")
+GAINS = ("stiffness", "damping")
 """Numbers of a control law that say what an action does."""
 OLDER_LAW = {"law": "pd", "feedback": 0.0, "feedforward": 0.0, "action_factor": 1.0}
 """Those of files from before they could be chosen; of the others null is the robot's own."""
@@ -52,27 +50,36 @@ def require_same_law(networks: Networks, control: ControlConfig, robot: Robot, s
             f"start {start!r} was trained for robot {trained_for!r}, not for "
             f"{robot.description.name!r}"
         )
-    apart = "; ".join(_differences(networks, control, robot))
-    if not apart:
+    found = dict(_differences(networks, control, robot))
+    if not found:
         return
-    remedy = _remedy(recorded_law(networks), control)
+    apart = "; ".join(f"{name} {text}" for name, text in found.items())
+    law = recorded_law(networks)
     if networks.is_policy or start not in STARTS:
+        remedy = _remedy(law, control, ACTIONS + GAINS) or "restore the robot's YAML"
         raise BadPolicy(f"start {start!r} has another control law: {remedy} ({apart})")
+    # Its gains may be unstable on this robot.
+    settings = "" if set(found) <= set(GAINS) else _remedy(law, control, ACTIONS)
+    own = (
+        f"robojackson pretrain --kind track --robot {robot.description.name} makes one of this law"
+    )
     log.warning(
-        "start %r has learnt another control law, and its actions mean something else here: %s; "
-        "to train on with its own law: %s", start, apart, remedy,
+        "start %r has learnt another control law, and its actions mean something else here: %s; %s",
+        start, apart, f"to train on with its own law: {settings}" if settings else own,
     )  # fmt: skip
 
 
-def _differences(networks: Networks, control: ControlConfig, robot: Robot) -> Iterator[str]:
-    """Yield what an action means there and here, where that differs."""
+def _differences(
+    networks: Networks, control: ControlConfig, robot: Robot
+) -> Iterator[tuple[str, str]]:
+    """Yield what an action means there and here, by name, where that differs."""
     law = recorded_law(networks)
     if not law:
         return
     for name in ("law",) if control.law == "torque" else ("law", "feedback", "feedforward"):
         then, now = _number(law, name), getattr(control, name)
         if then != now:
-            yield f"{name} {then} there, {now} here"
+            yield name, f"{then} there, {now} here"
     if "torque" in (control.law, _number(law, "law")):
         return
     learnt = networks.facts.get("actuation")
@@ -84,14 +91,13 @@ def _differences(networks: Networks, control: ControlConfig, robot: Robot) -> It
         if there.shape != (len(motors),) or np.allclose(there, here, rtol=1e-6):
             continue  # networks for another number of motors fit no layer
         worst = int(np.argmax(np.abs(there - here)))
-        yield f"{name} {there[worst]:g} of {motors[worst]} there, {here[worst]:g} here"
+        yield name, f"{there[worst]:g} of {motors[worst]} there, {here[worst]:g} here"
 
 
-def _remedy(law: Mapping[str, object], control: ControlConfig) -> str:
-    """Return what gives a training the recorded law."""
-    apart = [name for name in NUMBERS if _number(law, name) != getattr(control, name)]
-    given = [f"--set track.control.{name}={_text(_number(law, name))}" for name in apart]
-    return " ".join(given) or "restore the robot's YAML"
+def _remedy(law: Mapping[str, object], control: ControlConfig, names: Iterable[str]) -> str:
+    """Return the settings that give a training these numbers of the recorded law."""
+    apart = [name for name in names if _number(law, name) != getattr(control, name)]
+    return " ".join(f"--set track.control.{name}={_text(_number(law, name))}" for name in apart)
 
 
 def _number(law: Mapping[str, object], name: str) -> object:

@@ -42,14 +42,20 @@ def problems(description: RobotDescription) -> list[str]:
     return [*_upright(robot), *_out_of_range(robot), *_sides(robot), *unstable_gains(robot)]
 
 
-def unstable_gains(robot: Robot) -> Iterator[str]:
+def unstable_gains(
+    robot: Robot, damping: Float[np.ndarray, " J"] | None = None, place: str = ""
+) -> Iterator[str]:
     """Yield a line about the hinge whose damping is the furthest from stable, if one is not.
 
     A hinge that feels the inertia I turns at (1 - kd h / I) v after a step h in which the torque of
     its damping kd at the speed v was held: beyond 2 it swings up to its torque limit.
+
+    Args:
+        damping: Derivative gain a hinge, Nm s/rad; the robot's own when None.
+        place: Where that is set; the robot's YAML when empty.
     """
     timestep, inertia = float(robot.model.opt.timestep), hinge_inertia(robot)
-    damping = np.where(robot.actuated, robot.actuation.damping, 0.0)
+    damping = np.where(robot.actuated, robot.actuation.damping if damping is None else damping, 0.0)
     ratio = damping * timestep / inertia
     worst, count = int(np.argmax(ratio)), int((ratio > MOST_DAMPING).sum())
     if not count:
@@ -57,9 +63,9 @@ def unstable_gains(robot: Robot) -> Iterator[str]:
     others = f" ({count} hinges are above)" if count > 1 else ""
     armature = robot.model.dof_armature[6 + worst] + (ratio[worst] - 1) * inertia[worst]
     yield (
-        f"{where(robot.description, 'damping')}: the gains of {robot.joint_names[worst]!r} are "
-        f"unstable: damping {damping[worst]:.3g} Nm s/rad x timestep {timestep:g} s / inertia "
-        f"{inertia[worst]:.2g} kg m^2 = {ratio[worst]:.3g}, at most {MOST_DAMPING:g} is stable"
+        f"{place or where(robot.description, 'damping')}: the gains of "
+        f"{robot.joint_names[worst]!r} are unstable: damping {damping[worst]:.3g} Nm s/rad x "
+        f"timestep {timestep:g} s / inertia {inertia[worst]:.2g} kg m^2 = {ratio[worst]:.3g}, at most {MOST_DAMPING:g} is stable"
         f"{others}; name its motor's armature ({armature:.2g} makes it 1), less damping "
         f"({inertia[worst] / timestep:.2g}) or a shorter simulation.timestep"
     )

@@ -3,7 +3,8 @@
 from robojackson.report.pages.closeness import sentences
 
 CLOSE = {
-    "success": 0.96, "rollouts": 73.0, "lost_fell": 3.0, "lost_sites": 0.0, "lost_ends": 2.0,
+    "success": 0.96, "rollouts": 73.0, "whole_rollouts": 73.0,
+    "lost_fell": 3.0, "lost_sites": 0.0, "lost_ends": 2.0,
     "lost_kneels": 0.0, "lost_floor": 1.0, "mpjpe_l_alive_m": 0.0112, "mpjpe_g_alive_m": 0.043,
     "mpjpe_l_m": 0.0331, "acceleration_ratio": 1.544, "limb_gain_left_foot": 0.98,
     "limb_r2_left_foot": 0.912, "excess_speed_left_foot": 0.02, "limb_gain_left_hand": None,
@@ -23,6 +24,12 @@ def test_errors_are_given_until_a_fall_and_to_the_horizon() -> None:
     _, errors, _ = sentences(CLOSE)
     assert "11 mm relative to the root and 43 mm in the world until a fall, 33 mm" in errors
     assert "accelerations 1.54 times" in errors
+
+
+def test_where_fallen_robots_were_not_simulated_on_no_error_is_given_after_a_fall() -> None:
+    """As of Humanoid-v5: the mean would be of the robots that never fell."""
+    _, errors, _ = sentences({**CLOSE, "whole_rollouts": 70.0})
+    assert "in the world until a fall; accelerations" in errors
 
 
 def test_a_limb_that_hardly_moves_has_a_dash_for_its_gain() -> None:

@@ -11,7 +11,7 @@ import yaml
 from robojackson.api import policy_training
 from robojackson.files.json_types import to_json_types
 from robojackson.motion.reference_motion import ReferenceMotion
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.yaml_loader import build, load
 from robojackson.rl.config.tqc_config import PRESETS, ActorStart
 from robojackson.rl.config.train_config import TqcConfig, TrackConfig, TrainConfig
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
@@ -87,6 +87,13 @@ def test_a_configuration_that_was_written_is_polished_as_the_one_before(
     file.write_text(yaml.safe_dump(to_json_types(configured())))
     tqc = residual_learning(load(TrainConfig, str(file)), fed, replace(sway, cyclic=False), 0.5)
     assert asdict(tqc.actor_start) == PRESETS["polish"]
+
+
+def test_null_is_not_given_beside_a_preset() -> None:
+    """A file that was written whole holds nulls; a preset beside them gives its own numbers."""
+    nulls = dict.fromkeys(asdict(ActorStart()))
+    found = build(TqcConfig, {"preset": "polish", **nulls}, "tqc")
+    assert asdict(found.actor_start) == PRESETS["polish"]
 
 
 @pytest.mark.parametrize(("steps", "is_short"), [(40, True), (41, False), (None, False)])

@@ -102,8 +102,26 @@ def test_a_walker_of_another_law_is_one_warning_that_names_both(
     assert "--set track.control.action_factor=1.0" in line
 
 
-@pytest.mark.parametrize("name", ["humanoid", "humanoid_strong"])
-@pytest.mark.parametrize(("mode", "law"), [("track", "pd"), ("paper", "torque")])
+def test_a_walker_of_other_gains_is_no_reason_to_take_them(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The shipped one has the humanoid's damping, which shakes humanoid_strong."""
+    robot = load_robot(describe_robot("humanoid_strong"))
+    walker = load_networks(shipped_walker("track"))
+    require_same_law(walker, resolved(ControlConfig(), robot), robot, "walker")
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert "--set" not in line
+    assert line.endswith("pretrain --kind track --robot humanoid_strong makes one of this law")
+
+
+@pytest.mark.parametrize(
+    ("name", "mode", "law"),
+    [
+        ("humanoid", "track", "pd"),
+        ("humanoid", "paper", "torque"),
+        ("humanoid_strong", "paper", "torque"),
+    ],
+)
 def test_the_shipped_walkers_have_the_law_of_their_robots(
     name: str, mode: str, law: str, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from robojackson.errors import BadConfiguration
 from robojackson.pipeline.robot_descriptions import describe_robot, robot_names
-from robojackson.rl.config.train_config import ControlConfig
+from robojackson.rl.config.train_config import ControlConfig, TrackConfig, TrainConfig
 from robojackson.rl.modes.reset_states import default_standing_pose
 from robojackson.rl.sim.simulation import Simulation
 from robojackson.rl.sim.trainable import require_trainable
@@ -101,6 +101,14 @@ def test_unstable_gains_are_a_problem_with_a_remedy() -> None:
         BadConfiguration, match=r"training is not possible .* 'right_hip_z' are unst"
     ):
         require_trainable(load_robot(STRONG))
+
+
+def test_the_gains_of_a_training_count_not_only_those_of_the_robot() -> None:
+    """`--set track.control.damping` gave a robot what its YAML may not; torques need no gains."""
+    shaking = TrackConfig(control=ControlConfig(stiffness=4.0, damping=0.1))
+    with pytest.raises(BadConfiguration, match=r"yet: track\.control\.damping: .* = 5\.24"):
+        require_trainable(load_robot(NOW), TrainConfig(steps=1, track=shaking))
+    require_trainable(load_robot(STRONG), TrainConfig(steps=1, mode="paper"))
 
 
 @pytest.mark.parametrize(

@@ -76,12 +76,16 @@ class Advice:
         return {**figures, "words": str(self), **part}
 
 
-def advise(track: LandmarkTrack) -> tuple[Advice, ...]:
+def advise(track: LandmarkTrack, begin_s: float = 0.0) -> tuple[Advice, ...]:
     """Return what to do better, the gravest kinds of a list by hand first; nothing for a good
-    clip."""
+    clip.
+
+    Args:
+        begin_s: Where the clip begins in the video that the user has, seconds.
+    """
     ranges = {"person_missing": visible_range(track)}
     return tuple(
-        Advice(kind, value, LIMITS[kind], ranges.get(kind))
+        Advice(kind, value, LIMITS[kind], ranges.get(kind)).later(begin_s)
         for kind, value in _figures(track).items()
         if value is not None and (value > LIMITS[kind] if kind in AT_MOST else value < LIMITS[kind])
     )

@@ -42,12 +42,14 @@ def _errors(evaluation: Evaluation) -> str:
     if any(value is None for value in figures.values()):
         return ""
     local, world = (format_value(key, value) for key, value in figures.items())
-    whole = format_value("mpjpe_l_m", evaluation.get("mpjpe_l_m"))
+    whole = ""
+    if evaluation.get("whole_rollouts") == evaluation.get("rollouts"):  # simulated on after a fall
+        figure = format_value("mpjpe_l_m", evaluation.get("mpjpe_l_m"))
+        whole = f", {figure} relative to the root with what follows it"
     faster = format_value("acceleration_ratio", evaluation.get("acceleration_ratio"))
     return (
         f"Mean position error (mpjpe): {local} relative to the root and {world} in the world until "
-        f"a fall, {whole} relative to the root with what follows it; accelerations {faster} times "
-        "the reference's."
+        f"a fall{whole}; accelerations {faster} times the reference's."
     )
 
 

@@ -1,5 +1,6 @@
 """The numbers of TQC (Kuznetsov et al., 2020), with presets of the paper and its released code."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, Literal
 
@@ -162,6 +163,8 @@ class TqcConfig:
     @model_validator(mode="before")
     @classmethod
     def _preset(cls, given: Any) -> Any:
+        if isinstance(given, Mapping):  # null is not given, as in a file that was written whole
+            given = {k: v for k, v in given.items() if k not in START or v is not None}
         return with_preset(given, PRESETS, "dance")
 
     @model_validator(mode="after")

@@ -54,6 +54,7 @@ def summarise(rows: list[dict[str, object]]) -> dict[str, float]:
     out |= {key: _mean(rows, key) for key in limbs}
     out["limb_gain"] = _nanmean([out[key] for key in limbs if key.startswith("limb_gain_")])
     out["rollouts"] = float(len(rows))
+    out["whole_rollouts"] = float(sum(np.isfinite([float(row["mpjpe_l_m"]) for row in rows])))  # type: ignore[arg-type]
     fallen = [bool(row["fell"]) for row in rows]
     out["lost_fell"] = float(sum(fallen))
     for loss, column in LOST.items():

@@ -2,17 +2,22 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from robojackson.errors import BadConfiguration
+from robojackson.rl.config.train_config import ControlConfig, TrainConfig
+from robojackson.rl.sim.motors import Motors, gains
 from robojackson.robot.description_check import unstable_gains
 from robojackson.robot.fall import Fall, standing_height
 from robojackson.robot.model import Robot
 
 
-def require_trainable(robot: Robot) -> None:
+def require_trainable(robot: Robot, config: TrainConfig | None = None) -> None:
     """Raise for a robot without usable motors or gains, or whose stand counts as a fall.
 
+    Args:
+        config: The training, whose control law may have gains of its own; in mode paper policies
+            give torques, and gains do not count. The robot's own gains when None.
     Raises:
         BadConfiguration: it has no torque motors with a range, it is too small, or its gains are
             unstable.
@@ -34,13 +39,22 @@ def require_trainable(robot: Robot) -> None:
             f"it stands with its root {height:.2f} m above the floor, and less than "
             f"{fall.height:g} m counts as a fall (fall.height of its YAML)"
         )
-    else:
-        reason = next(unstable_gains(robot), "")
+    elif config is None or config.mode == "track":
+        control = ControlConfig() if config is None else config.track.control
+        reason = next(unstable_gains(robot, *_damping(robot, control)), "")
     if reason:
         raise BadConfiguration(
             f"training is not possible on robot {robot.description.name!r} yet: {reason}; "
             "retargeting, its video and export are"
         )
+
+
+def _damping(robot: Robot, control: ControlConfig) -> tuple[Float[np.ndarray, " J"], str]:
+    """Return the derivative gain of each hinge under a control law, and where it is set."""
+    hinges, (_, damping) = Motors.of(robot.model).hinge, gains(robot, control)
+    set_by_hand = control.stiffness is not None or control.damping is not None
+    found = np.bincount(hinges, damping, len(robot.joint_names))
+    return found, "track.control.damping" if set_by_hand else ""
 
 
 def _torque_motors(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:
