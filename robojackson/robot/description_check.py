@@ -65,7 +65,8 @@ def unstable_gains(
     yield (
         f"{place or where(robot.description, 'damping')}: the gains of "
         f"{robot.joint_names[worst]!r} are unstable: damping {damping[worst]:.3g} Nm s/rad x "
-        f"timestep {timestep:g} s / inertia {inertia[worst]:.2g} kg m^2 = {ratio[worst]:.3g}, at most {MOST_DAMPING:g} is stable"
+        f"timestep {timestep:g} s / inertia {inertia[worst]:.2g} kg m^2 = {ratio[worst]:.3g}, "
+        f"at most {MOST_DAMPING:g} is stable"
         f"{others}; name its motor's armature ({armature:.2g} makes it 1), less damping "
         f"({inertia[worst] / timestep:.2g}) or a shorter simulation.timestep"
     )
