@@ -80,6 +80,14 @@ def test_a_ghost_of_a_few_frames_is_no_person() -> None:
     assert len(tracks(frames)) == 1
 
 
+def test_a_person_beside_a_ghost_of_the_first_frame_is_found() -> None:
+    """All that followed might have been either of the two, so that nobody was."""
+    frames = [[seen(100 + i)] for i in range(60)]
+    frames[0] = [seen(100), seen(130)]
+    (track,) = tracks(frames)
+    assert (~np.isnan(hips_x(track))).sum() >= 59
+
+
 def test_the_largest_steady_person_is_the_first() -> None:
     frames = [
         [seen(100, tall=120), seen(300, tall=160), *([seen(520, tall=260)] if i < 25 else [])]
