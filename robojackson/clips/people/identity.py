@@ -77,7 +77,7 @@ def identify(
         p for p in tracklets if not p.blended and _lasts(p, config.shortest_tracklet_s, period_s)
     ]
     blends = [p for p in tracklets if p.blended and _lasts(p, config.shortest_blend_s, period_s)]
-    if not clear:  # beside a ghost of the first frame: where nobody else was seen, it is one person
+    if not clear:  # beside a ghost of the first frame: where no other was seen, it is one person
         clear, blends = blends, []
     tracks = [_table(c, len(frames)) for c in assign_merged(blends, chains(clear, config), config)]
     shortest_s = max(config.shortest_s, config.least_share * duration_s)

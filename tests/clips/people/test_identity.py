@@ -81,7 +81,7 @@ def test_a_ghost_of_a_few_frames_is_no_person() -> None:
 
 
 def test_a_person_beside_a_ghost_of_the_first_frame_is_found() -> None:
-    """All that followed might have been either of the two, so that nobody was."""
+    """All that followed might have been either of the two, so that no person was found."""
     frames = [[seen(100 + i)] for i in range(60)]
     frames[0] = [seen(100), seen(130)]
     (track,) = tracks(frames)
