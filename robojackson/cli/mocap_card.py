@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from robojackson.cli.cards import Answer, advice_lines, closing
-from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN, Advice
+from robojackson.clips.quality.advice import HALF_TURN, QUARTER_TURN
 
 if TYPE_CHECKING:
     from robojackson.motion.smpl_sequence import SmplSequence
@@ -19,10 +19,6 @@ SHORTEST_S = 0.25
 """Shortest motion that is retargeted, about; seconds."""
 RISE = 0.5
 """Vertical part of a trunk's direction below which it lies, and hangs below its negative."""
-PARTS = ("weak_s", "filled_s")
-"""Lists of stretches of a clip, seconds."""
-ADVICE = ("kind", "value", "limit", "range_s")
-"""Fields of a record of advice."""
 TURNED = 0.5
 """Share of frames in which a person hangs or lies from which the picture may be turned."""
 
@@ -75,31 +71,12 @@ def mocap_lines(answer: Answer) -> list[str]:
     return [*rows, *closing(answer)]
 
 
-def with_verdict(answer: dict[str, object], start_s: float | None = None) -> dict[str, object]:
-    """Return the answer with its verdict; without a next command where that would be refused.
-
-    Args:
-        start_s: Where the clip begins in the video that was given: all moments are of that.
-    """
-    if start_s:
-        answer = _in_the_video(answer, start_s)
+def with_verdict(answer: dict[str, object]) -> dict[str, object]:
+    """Return the answer with its verdict; without a next command where that would be refused."""
     verdict = mocap_verdict(answer)
     if verdict["kind"] == "short":
         answer = {key: value for key, value in answer.items() if key != "next"}
     return answer | {"verdict": verdict}
-
-
-def _in_the_video(answer: Answer, start_s: float) -> dict[str, object]:
-    shifted: dict[str, object] = {
-        "advice": [
-            Advice(*(each.get(key) for key in ADVICE)).later(start_s).record
-            for each in answer["advice"]
-        ]
-    }
-    if (found := answer.get("reprojection")) is not None:
-        parts = {key: [[start_s + s for s in part] for part in found[key]] for key in PARTS}
-        shifted["reprojection"] = {**found, **parts}
-    return {**answer, **shifted}
 
 
 SOURCES_OF_UP = {

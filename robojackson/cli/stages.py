@@ -38,8 +38,13 @@ def mocap(
     overrides: Overrides,
     hypotheses: int = 0,
     second: Path | None = None,
+    start_s: float | None = None,
 ) -> Figures:
-    """Write landmarks.parquet and smpl.parquet of a video or two, and smpl_1... of hypotheses."""
+    """Write landmarks.parquet and smpl.parquet of a video or two, and smpl_1... of hypotheses.
+
+    Args:
+        start_s: Where the clip begins in the video that was given: advice is about that.
+    """
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights
     from robojackson.cli.pictures import motion_source
@@ -75,7 +80,7 @@ def mocap(
         "floor": mocap_card.floor_figures(sequence),
         "contact_share": mocap_card.contact_shares(sequence),
         "notes": list(sequence.notes),
-        "advice": [each.record for each in advise(track)],
+        "advice": [each.record for each in advise(track, start_s or 0.0)],
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }

@@ -31,7 +31,7 @@ from robojackson.formats.foreign_motion import (
     skeleton_under,
 )
 from robojackson.mocap.grounding import contacts, flight
-from robojackson.mocap.grounding import floor as ground
+from robojackson.mocap.grounding.support import support_of
 from robojackson.mocap.landmarks import pinhole_camera
 from robojackson.mocap.landmarks.blazepose import fill_gaps
 from robojackson.mocap.pose.known_twist import TurnedBody, pose_keypoints
@@ -56,11 +56,7 @@ def ground_foreign_motion(motion: ForeignMotion, fps: float) -> SmplSequence:
     local[:, 0] = motion.to_world @ local[:, 0]
     pose = forward(local, motion.rest_joints[None], motion.pelvis @ motion.to_world.T)
     feet = foot_points(pose, motion.rest_joints)
-    height = ground.centre_of_mass(pose.points)[:, 2]
-    falling = flight.free_fall(height, fps)
-    elsewhere = ground.off_feet(pose.points, feet, falling, fps)
-    lowest = ground.support_height(pose.points, feet, elsewhere)
-    falling = falling | flight.ballistic(height, lowest, fps)
+    height, lowest, falling, _, elsewhere = support_of(pose.points, feet, fps)
     flying = flight.flight(lowest, height, falling, fps)
     floor = float(np.median(lowest[~flying] if (~flying).any() else lowest))
     notes = list(motion.notes)

@@ -89,20 +89,28 @@ def _off(error: Float[np.ndarray, " T"], sequence: SmplSequence) -> Bool[np.ndar
     return np.asarray((np.nan_to_num(error) > OFF_M) & np.asarray(sequence.valid, bool))
 
 
-def reprojection_record(sequence: SmplSequence, track: LandmarkTrack) -> dict[str, object]:
+def reprojection_record(
+    sequence: SmplSequence, track: LandmarkTrack, begin_s: float = 0.0
+) -> dict[str, object]:
     """Return the median and the largest error, metres; the weak stretches and those that are filled
-    in, seconds; and whether weak ones were left out."""
+    in, seconds; and whether weak ones were left out.
+
+    Args:
+        begin_s: Where the clip begins in the video that the user has, seconds.
+    """
     error = reprojection_error(sequence, track)
     if error is None or np.isnan(error).all():
         return {}
-    weak = stretches(_off(error, sequence))
-    filled = stretches(~np.asarray(sequence.valid, bool))
+
+    def moments(frames: np.ndarray) -> list[list[float]]:
+        return [[begin_s + frame / sequence.fps for frame in part] for part in stretches(frames)]
+
     return {
         "reprojection": {
             "median_m": float(np.nanmedian(error)),
             "largest_m": float(np.nanmax(error)),
-            "weak_s": [[start / sequence.fps, end / sequence.fps] for start, end in weak],
-            "filled_s": [[start / sequence.fps, end / sequence.fps] for start, end in filled],
+            "weak_s": moments(_off(error, sequence)),
+            "filled_s": moments(~np.asarray(sequence.valid, bool)),
             "left_out": any(LEFT_OUT in note for note in sequence.notes),
         }
     }

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.cli.mocap_card import _in_the_video
 from robojackson.cli.video_range import video_range
 from robojackson.clips.people.tracked_people import Person
 from robojackson.clips.quality.advice import Advice
@@ -85,14 +84,7 @@ def test_a_range_of_one_frame_names_the_video_and_the_range(tmp_path: Path) -> N
 
 def test_moments_are_those_of_the_whole_video() -> None:
     """Advice on a range is for `--start` and `--end`, which count from the video's beginning."""
-    advice = Advice("person_missing", 0.5, 0.9, (1.0, 5.0)).record
-    answer = {
-        "frames": 120, "fps": 30.0, "detected": 120, "advice": [advice],
-        "reprojection": {"weak_s": [[0.0, 1.0]], "filled_s": [], "left_out": False},
-    }  # fmt: skip
-    found = _in_the_video(answer, 2.0)
-    assert found["reprojection"]["weak_s"] == [[2.0, 3.0]]
-    (one,) = found["advice"]
-    assert "in sight from 3.0 to 7.0 s" in one["words"]
+    advice = Advice("person_missing", 0.5, 0.9, (1.0, 5.0)).later(2.0)
+    assert "in sight from 3.0 to 7.0 s" in str(advice.record["words"])
     person = Person(1, 200.0, 1.0, 0.5, 3.0, 0.5)
     assert "2.5-5.0 s" in str(person.later(2.0))

@@ -1,7 +1,5 @@
 """Frames of containers that say little: their times, and damage at their beginning."""
 
-from fractions import Fraction
-from io import BytesIO
 from pathlib import Path
 
 import av
@@ -11,6 +9,7 @@ import pytest
 from robojackson.clips.trim import trim
 from robojackson.clips.video import VideoLimits, probe, read_frames, timed_frames
 from robojackson.errors import UnreadableVideo
+from tests.fixtures.web_streams import noise_piece
 
 FPS, FRAMES = 30, 40
 
@@ -76,20 +75,7 @@ def test_a_video_without_a_picture_that_can_be_decoded_is_refused(tmp_path: Path
 
 def noise_in_pieces(starts: list[int]) -> bytes:
     """Return joined transport streams of 5 noisy pictures at 5 a second; each knows its start."""
-    rng, joined = np.random.default_rng(0), b""
-    for start in starts:
-        file = BytesIO()
-        with av.open(file, "w", format="mpegts") as container:
-            stream = container.add_stream("libx264", rate=5, options={"tune": "zerolatency"})
-            stream.width, stream.height, stream.pix_fmt = 64, 64, "yuv420p"
-            for number in range(5):
-                image = rng.integers(0, 255, (64, 64, 3), dtype=np.uint8)
-                frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-                frame.pts, frame.time_base = start + number, Fraction(1, 5)
-                container.mux(stream.encode(frame))
-            container.mux(stream.encode(None))
-        joined += file.getvalue()
-    return joined
+    return b"".join(noise_piece(start, frames=5, rate=5, side=64) for start in starts)
 
 
 def test_the_seams_of_a_stream_in_pieces_are_no_damage(tmp_path: Path) -> None:

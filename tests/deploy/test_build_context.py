@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ import yaml
 from docker.utils import exclude_paths
 
 from flows.search.dance_source import DEFAULT
+from tests.fixtures import checkout
 from tools.stack.service import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -32,7 +32,6 @@ JUNK = (
     *(".mypy_cache/x.json", ".pytest_cache/x", "node_modules/x/index.js", "id_rsa", "notes.txt"),
 )
 """What a working checkout has beside the files of the repository."""
-SKIPPED = {"store", "backup", "build", "dist", "__pycache__", "node_modules"}
 WATCH = """
 import sys
 root, venv = sys.argv.pop(1), sys.argv.pop(1)
@@ -56,24 +55,11 @@ for name in sys.argv[1:]:
 )
 
 
-def repository() -> Iterator[Path]:
-    """Yield the files of the checkout, relative; of hidden folders only `.ci`."""
-    for folder, inner, names in os.walk(ROOT):
-        inner[:] = [
-            name
-            for name in inner
-            if name not in SKIPPED
-            and not name.endswith(".egg-info")
-            and (name == ".ci" or not name.startswith("."))
-        ]
-        yield from ((Path(folder) / name).relative_to(ROOT) for name in names)
-
-
 @pytest.fixture(scope="module")
 def context(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     """Return the files that a build would get."""
     root = tmp_path_factory.mktemp("checkout")
-    for path in (*repository(), *map(Path, JUNK)):
+    for path in (*checkout.walked(ROOT, (".ci",)), *map(Path, JUNK)):
         (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).touch()
     lines = (ROOT / ".dockerignore").read_text().splitlines()

@@ -80,6 +80,9 @@ def test_a_body_beside_its_landmarks_is_off_by_as_much(
     found = reprojection_record(sequence, track)["reprojection"]
     assert isinstance(found, dict)
     assert found["weak_s"] == [[pytest.approx(4 / 30), pytest.approx(7 / 30)]]
+    later = reprojection_record(sequence, track, 2.0)["reprojection"]
+    assert isinstance(later, dict)
+    assert later["weak_s"] == [[pytest.approx(2 + 4 / 30), pytest.approx(2 + 7 / 30)]]
 
 
 def test_weak_frames_and_their_neighbours_are_left_out(

@@ -10,13 +10,19 @@ PICTURE, VIDEO = "mocap.png", "mocap.mp4"
 
 
 def draw_mocap(
-    video: Path, out: Path, config: str, overrides: Mapping[str, object], film: bool
+    video: Path,
+    out: Path,
+    config: str,
+    overrides: Mapping[str, object],
+    film: bool,
+    start_s: float | None = None,
 ) -> dict[str, object]:
     """Draw what `stages.mocap` wrote into a folder: over the source, from the front, from the side;
     and return how far the body lies off the source.
 
     Args:
         film: Whether to render a video, too.
+        start_s: Where the clip begins in the video that was given: all moments are of that.
     """
     from robojackson.api.progress_bar import bar
     from robojackson.mocap.reprojection import reprojection_record
@@ -29,7 +35,7 @@ def draw_mocap(
     track = LandmarkTrack.load(out / "landmarks.parquet")
     sequence = SmplSequence.load(out / "smpl.parquet")
     FileTree(out).write(PICTURE, body_sheet(video, track, sequence))
-    drawn = {"picture": str(out / PICTURE), **reprojection_record(sequence, track)}
+    drawn = {"picture": str(out / PICTURE), **reprojection_record(sequence, track, start_s or 0.0)}
     if film:
         settings = load(PipelineConfig, config, overrides)
         with bar(VIDEO) as progress:

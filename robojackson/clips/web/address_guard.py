@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from robojackson.errors import DownloadFailed
 
@@ -75,7 +75,7 @@ def host_of(address: str) -> str:
     Raises:
         ValueError: it is no address.
     """
-    return urlsplit(address if "://" in address else f"http://{address}").hostname or ""
+    return _parts(address).hostname or ""
 
 
 def host_and_port(address: str) -> tuple[str, int]:
@@ -84,8 +84,12 @@ def host_and_port(address: str) -> tuple[str, int]:
     Raises:
         ValueError: it is no address, or the port no number.
     """
-    parts = urlsplit(address if "://" in address else f"http://{address}")
-    return host_of(address), parts.port or PORTS.get(parts.scheme, 80)
+    parts = _parts(address)
+    return parts.hostname or "", parts.port or PORTS.get(parts.scheme, 80)
+
+
+def _parts(address: str) -> SplitResult:
+    return urlsplit(address if "://" in address else f"http://{address}")
 
 
 def is_public(address: str) -> bool:

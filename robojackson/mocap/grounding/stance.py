@@ -16,6 +16,7 @@ from robojackson.mocap.grounding import contacts, foot_pinning, leg_ik, pivots
 from robojackson.mocap.grounding import flight as air
 from robojackson.mocap.grounding import floor as ground
 from robojackson.mocap.grounding.foot_pinning import FootPinningConfig
+from robojackson.mocap.grounding.support import support_of
 from robojackson.mocap.pose.posed_body import Body
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SLIDING
 
@@ -91,12 +92,7 @@ class _Evidence:
 
 def ground_body(body: Body, fps: float, config: GroundingConfig) -> Stance:
     """Return the body on the floor, its feet level and pinned where planted, and the contacts."""
-    height = ground.centre_of_mass(body.pose.points)[:, 2]
-    falling = air.free_fall(height, fps)
-    elsewhere = ground.off_feet(body.pose.points, body.feet, falling, fps)
-    lowest = ground.support_height(body.pose.points, body.feet, elsewhere)
-    jumps = air.ballistic(height, lowest, fps)
-    falling = falling | jumps
+    height, lowest, falling, jumps, elsewhere = support_of(body.pose.points, body.feet, fps)
     flying = air.flight(lowest, height, falling, fps) | jumps
     speed, root = contacts.image_speed(body.feet, fps), body.pose.points[:, 0]
     along = contacts.ray_speed(body.feet, fps)

@@ -3,7 +3,7 @@
 Every figure is a key of evaluation.json (`rl.evaluation.starts.summarise`).
 """
 
-from robojackson.report.pages.evaluation_text import Evaluation
+from robojackson.report.pages.evaluation_text import RESPONSES, Evaluation
 from robojackson.report.quantities import format_value
 from robojackson.robot.names import FEET, HANDS
 
@@ -63,7 +63,5 @@ def _ends(evaluation: Evaluation) -> str:
         return " ".join(format_value(prefix, evaluation.get(f"{prefix}_{limb}")) for limb in limbs)
 
     names = ", ".join(limb.replace("_", " ") for limb in limbs).capitalize()
-    return (
-        f"{names}: gain {of_all('limb_gain')}; R2 {of_all('limb_r2')}; excess speed, m/s, "
-        f"{of_all('excess_speed')}."
-    )
+    gain, r2, excess = map(of_all, RESPONSES)
+    return f"{names}: gain {gain}; R2 {r2}; excess speed, m/s, {excess}."

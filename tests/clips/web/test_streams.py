@@ -1,11 +1,8 @@
 """Streams of pieces (HLS): whole or not at all, and no external program."""
 
-import io
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 from yt_dlp.aes import aes_cbc_encrypt_bytes
@@ -15,29 +12,15 @@ from robojackson.clips.web.download_formats import FormatConfig
 from robojackson.clips.web.yt_dlp_client import fetch, offer
 from robojackson.errors import DownloadFailed
 from tests.fixtures.web_server import PATIENT, Web
+from tests.fixtures.web_streams import noise_piece
 
 PIECES, FRAMES, RATE = 3, 5, 5
-
-
-def piece(number: int) -> bytes:
-    """Return a second of noise as MPEG-TS."""
-    rng, file = np.random.default_rng(number), io.BytesIO()
-    with av.open(file, "w", format="mpegts") as container:
-        options = {"crf": "20", "tune": "zerolatency"}
-        stream = container.add_stream("libx264", rate=Fraction(RATE), options=options)
-        stream.width, stream.height, stream.pix_fmt = 32, 32, "yuv420p"
-        for n in range(FRAMES):
-            frame = av.VideoFrame.from_ndarray(rng.integers(0, 255, (32, 32, 3), dtype=np.uint8))
-            frame.pts, frame.time_base = FRAMES * number + n, Fraction(1, RATE)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    return file.getvalue()
 
 
 @pytest.fixture
 def streaming(web: Web) -> Web:
     """Return a running server with a stream of three pieces."""
-    web.pieces = [piece(number) for number in range(PIECES)]
+    web.pieces = [noise_piece(FRAMES * n, FRAMES, RATE, side=32) for n in range(PIECES)]
     return web
 
 
