@@ -22,6 +22,7 @@ from benchmarks.learning.training_rows import STEPS_A_MINUTE
 from robojackson.files.file_tree import FileTree
 from robojackson.motion.reference_motion import poses_sha256
 from robojackson.pipeline.folder_lock import locked
+from robojackson.report.quantities import format_value
 from robojackson.rl.evaluation.passport import LEAST_SHARE
 
 TRAINED = [
@@ -110,7 +111,7 @@ def _show(rows: list[dict[str, Any]]) -> None:
         names = "; ".join(f"{case['case']} {case['strict_success']:.0%}" for case in missed(row))
         table.add_row(
             row["move"], str(row["seed"]), f"{row['steps']:,}", f"{row['strict_success']:.1%}",
-            f"{row['skill']:.2f}", f"{1e3 * row['mpjpe_l_m']:.0f} mm",
+            *(format_value(name, row[name]) for name in ("skill", "mpjpe_l_m")),
             f"{len(cases) - len(missed(row))} of {len(cases)}", names,
         )  # fmt: skip
     Console(width=180).print(table)

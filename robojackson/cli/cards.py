@@ -11,6 +11,7 @@ from typing import Any
 
 from robojackson.cli.console import lines
 from robojackson.cli.lifetime.interruption import program
+from robojackson.files.json_types import number_of
 from robojackson.motion.reference_motion import tempo_beside_clip
 from robojackson.retarget.scorecard_gate import BARS, failures
 
@@ -115,7 +116,7 @@ def retarget_verdict(card: Mapping[str, Any]) -> dict[str, str]:
         return {
             "kind": "refused",
             "sentence": f"The robot cannot follow this: {failed[0].replace('_', ' ')} is "
-            f"{card.get(failed[0], math.nan):.3g}, at most {BARS[failed[0]]:g} is allowed.",
+            f"{number_of(card.get(failed[0])):.3g}, at most {BARS[failed[0]]:g} is allowed.",
         }
     tempo = tempo_beside_clip(card)
     slow = "" if tempo > 0.995 else f" at {tempo:.2f} of the dancer's tempo"

@@ -29,6 +29,11 @@ def to_json_types(value: Any) -> Any:
     return value if value is None or isinstance(value, str | int | bool) else str(value)
 
 
+def number_of(value: float | None) -> float:
+    """Return a figure of a JSON file as a number: NaN where the file has null (`to_json_types`)."""
+    return math.nan if value is None else float(value)
+
+
 def to_json(value: object) -> bytes:
     """Return a value as the content of a JSON file."""
     return json.dumps(to_json_types(value), indent=1, allow_nan=False).encode()

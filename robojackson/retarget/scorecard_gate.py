@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from robojackson.errors import RejectedReference
+from robojackson.files.json_types import number_of
 from robojackson.motion.reference_motion import ReferenceMotion
 
 BARS: Mapping[str, float] = {
@@ -81,7 +80,7 @@ def check(card: Mapping[str, Any]) -> None:
     if failed:
         name = failed[0]
         others = f" (and {', '.join(failed[1:])})" if failed[1:] else ""
-        value = card.get(name, np.nan)
+        value = number_of(card.get(name))
         raise RejectedReference(
             f"reference refused: {name} is {value:.4g}, at most {BARS[name]:g} is "
             f"allowed{others}{_reasons(name, card)}",

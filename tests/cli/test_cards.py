@@ -1,11 +1,13 @@
 """What single stages say to people: a verdict last, and a command that can be typed."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from robojackson.cli import cards
 from robojackson.cli.lifetime import interruption
+from robojackson.files.json_types import to_json
 from robojackson.retarget.scorecard_gate import BARS
 
 VIDEO = {"missing_joints": 3, "jitter": 0.5, "frames": 60, "fps": 30.0, "detected": 60}
@@ -55,6 +57,12 @@ def test_a_motion_over_a_bar_is_refused_by_the_name_of_the_figure() -> None:
     result = cards.retarget_verdict(CARD | {"planted_slip_cm_s": 7.0})
     assert result["kind"] == "refused"
     assert "planted slip cm s is 7, at most 1" in result["sentence"]
+
+
+def test_a_figure_that_is_no_number_is_refused_by_its_name_from_a_file_too() -> None:
+    card = json.loads(to_json(CARD | {"fallen_share": float("nan")}))
+    result = cards.retarget_verdict(card)
+    assert "fallen share is nan, at most 0" in result["sentence"]
 
 
 @pytest.mark.parametrize(

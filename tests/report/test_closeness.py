@@ -1,15 +1,22 @@
 """Sentences of what strict success lost and of how closely a robot follows."""
 
+import json
+
+import numpy as np
+
+from robojackson.files.json_types import to_json
 from robojackson.report.pages.closeness import sentences
 
-CLOSE = {
+FIGURES = {
     "success": 0.96, "rollouts": 73.0, "whole_rollouts": 73.0,
     "lost_fell": 3.0, "lost_sites": 0.0, "lost_ends": 2.0,
     "lost_kneels": 0.0, "lost_floor": 1.0, "mpjpe_l_alive_m": 0.0112, "mpjpe_g_alive_m": 0.043,
     "mpjpe_l_m": 0.0331, "acceleration_ratio": 1.544, "limb_gain_left_foot": 0.98,
-    "limb_r2_left_foot": 0.912, "excess_speed_left_foot": 0.02, "limb_gain_left_hand": None,
-    "limb_r2_left_hand": None, "excess_speed_left_hand": 0.42,
+    "limb_r2_left_foot": 0.912, "excess_speed_left_foot": 0.02, "limb_gain_left_hand": np.nan,
+    "limb_r2_left_hand": np.nan, "excess_speed_left_hand": 0.42,
 }  # fmt: skip
+CLOSE = json.loads(to_json(FIGURES))
+"""The figures as a page reads them: null where there is no number."""
 
 
 def test_each_broken_rule_is_named_with_its_rollouts() -> None:

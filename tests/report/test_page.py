@@ -1,6 +1,8 @@
 """The page: complete, escaped, offline; and what it says is what was measured."""
 
+import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from robojackson.body.skeleton import keypoint
 from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
+from robojackson.files.json_types import to_json
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.pages.evaluation_text import beat_rows, next_step
@@ -29,12 +32,14 @@ from robojackson.report.video.timeline import Timeline
 from robojackson.report.web.player_data import Player
 
 POLICIES = ("trained", "statue")
-SUMMARY = {
+FIGURES = {
     "survived_s": 8.25, "success": 0.62, "strict_success": 0.5, "skill": 0.31,
     "site_error_m": 0.048, "limb_gain": 0.9, "limb_gain_left_hand": 0.93,
     "limb_gain_left_foot": float("nan"), "rollouts": 73.0,
     "baselines": {"statue": {"survived_s": 1.0, "success": 0.03, "rollouts": 73.0}},
 }  # fmt: skip
+SUMMARY = json.loads(to_json(FIGURES))
+"""The figures as a page reads them: null where there is no number."""
 
 
 @pytest.fixture
@@ -295,8 +300,9 @@ def test_training_curve_is_the_median() -> None:
     np.testing.assert_allclose(line.get_ydata(), [2.0])
 
 
-def test_limb_that_does_not_move_is_reported_so() -> None:
-    texts = [text.get_text() for text in run_plots.limb_gains(SUMMARY).axes[0].texts]
+@pytest.mark.parametrize("summary", [FIGURES, SUMMARY], ids=["measured", "read"])
+def test_limb_that_does_not_move_is_reported_so(summary: Mapping[str, object]) -> None:
+    texts = [text.get_text() for text in run_plots.limb_gains(summary).axes[0].texts]
     assert texts == [" 0.93", " does not move in the reference"]
 
 

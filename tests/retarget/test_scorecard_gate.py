@@ -1,5 +1,7 @@
 """Red team: no spoilt motion passes the gate, and the message names the figure."""
 
+import json
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 from robojackson.errors import RejectedReference
+from robojackson.files.json_types import to_json
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.scorecard import score
@@ -122,6 +125,13 @@ def test_of_several_figures_the_one_that_explains_the_others_is_named_first():
     message = str(refused.value)
     assert message.index("a fall") < message.index("not over its feet")
     assert "(and contact_gap_mm)" in message
+
+
+def test_a_figure_that_is_no_number_is_refused_by_name_from_a_file_too():
+    card = json.loads(to_json(dict.fromkeys(BARS, 0.0) | {"fallen_share": np.nan}))
+    with pytest.raises(RejectedReference, match="fallen_share is nan") as refused:
+        check(card)
+    assert math.isnan(refused.value.value)
 
 
 @pytest.mark.parametrize("figure", sorted(BARS))

@@ -16,6 +16,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from robojackson.files.json_types import number_of
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import CONTACT_POINTS, SmplSequence
 from robojackson.report.quantities import POLICY_TITLES, decimal
@@ -90,10 +91,14 @@ def _whole_s(row: Row) -> float:
 
 
 def limb_gains(summary: Mapping[str, Any]) -> Figure:
-    """Plot the velocity gain of each limb end beside its reference; 1 is the whole amplitude."""
+    """Plot the velocity gain of each limb end beside its reference; 1 is the whole amplitude.
+
+    A limb without a gain, NaN or None, does not move in the reference.
+    """
     figure, (axes,) = figure_of(7.0, 2.4)
     prefix = "limb_gain_"
-    gains = {k.removeprefix(prefix): float(v) for k, v in summary.items() if k.startswith(prefix)}
+    found = {key: value for key, value in summary.items() if key.startswith(prefix)}
+    gains = {key.removeprefix(prefix): number_of(value) for key, value in found.items()}
     names = [name.replace("_", " ") for name in gains]
     values = np.nan_to_num(np.array(list(gains.values())))
     axes.barh(names, values, color=[_side_colour(name) for name in gains])
