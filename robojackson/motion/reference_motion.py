@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from typing_extensions import TypedDict
 
 from robojackson.files.fact_types import (
@@ -139,6 +139,14 @@ class ReferenceMotion(TableFile):
             f"ReferenceMotion(robot={self.robot!r}, {len(self)} steps of {1000 * self.dt:g} ms, "
             f"{len(self) * self.dt:.1f} s, {kind}{slow})"
         )
+
+    @property
+    def in_clip(self) -> Bool[np.ndarray, " S"]:
+        """The steps at which the clip goes on: not the stands and steps before and after it, which
+        show its first and its last moment all along."""
+        moves = np.diff(self.source_time_s) != 0
+        result: np.ndarray = np.append(moves, False) | np.insert(moves, 0, False)
+        return result
 
     def to_columns(self) -> tuple[Columns, Facts]:
         """Return the columns and the metadata of the table."""

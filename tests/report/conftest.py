@@ -1,5 +1,6 @@
 """A tiny run: 12 frames of a person who waves, a cyclic reference and a rollout of the humanoid."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -15,6 +16,20 @@ from robojackson.report.video.encoder import write_video
 
 FRAMES, FPS, STEPS, DT = 12, 30.0, 27, 0.015
 SIZE = (96, 64)
+
+
+def with_stands(motion: ReferenceMotion, before: int = 40, after: int = 60) -> ReferenceMotion:
+    """Return a motion that stands in its first pose for some steps before the clip and after it."""
+    step = np.r_[np.zeros(before, int), np.arange(len(motion)), np.zeros(after, int)]
+    times = np.pad(np.asarray(motion.source_time_s), (before, after), mode="edge")
+    rows = ("qpos", "qvel", "body_pos_w", "keypoints_w", "contact", "torque_ratio")
+    return replace(
+        motion,
+        **{name: np.asarray(getattr(motion, name))[step] for name in rows},
+        cyclic=False,
+        cycle_offset=np.zeros(3),
+        source_time_s=times,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robojackson.body.skeleton import keypoint
 from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
@@ -20,16 +19,12 @@ from robojackson.report.pages.evaluation_text import beat_rows, next_step
 from robojackson.report.pages.page_content import (
     TO_COME,
     Results,
-    limb_directions,
-    limb_rows,
     page_content,
     versions,
 )
 from robojackson.report.pages.run_page import PageContent, render, write_page
 from robojackson.report.plots import run_plots
 from robojackson.report.quantities import format_value, quantity
-from robojackson.report.video.timeline import Timeline
-from robojackson.report.web.player_data import Player
 
 POLICIES = ("trained", "statue")
 FIGURES = {
@@ -163,34 +158,6 @@ def test_the_robot_is_named_above_the_dance_and_in_the_window() -> None:
     html = render(PageContent(title="hip shake", robot="g1"))
     assert "<title>hip shake, g1 · RoboJackson</title>" in html
     assert '<p class="kicker">RoboJackson · g1</p>' in html
-
-
-@pytest.mark.medium
-def test_errors_by_limb_end_with_the_rollout(results: Results) -> None:
-    error = np.linspace(0.0, 0.9, 10)
-    when = Timeline(*np.zeros((5, 10), int), ended=np.arange(10) >= 5)
-    shown = Player({}, [], when, dict.fromkeys(("head", "left_hand"), error), {})
-    rows = {row.title: row.values for row in limb_rows(replace(results, player=shown))}
-    assert rows["head"][2] == "200 mm"
-    assert rows["left foot"][2] == "–"
-
-
-def test_a_robot_at_the_dancers_wrists_and_ankles_points_its_limbs_as_the_dancer(
-    sequence: SmplSequence, reference: ReferenceMotion
-) -> None:
-    """The hand and the foot of a robot follow them, not the fingers and the ball of the foot."""
-    frames = np.round(np.asarray(reference.source_time_s) * sequence.fps).astype(int)
-    person = np.asarray(sequence.keypoints_w, float)[np.clip(frames, 0, len(sequence) - 1)]
-    names = ("pelvis", "head") + tuple(
-        f"{side}_{part}"
-        for side in ("left", "right")
-        for part in ("shoulder", "hand", "hip", "foot")
-    )
-    humans = [name.replace("hand", "wrist").replace("foot", "ankle") for name in names]
-    points = person[:, [keypoint(name) for name in humans]]
-    robots = replace(reference, keypoints_w=points, keypoint_names=names)
-    found = limb_directions(sequence, robots)
-    assert max(found.values()) < 0.1
 
 
 def test_the_survival_of_a_motion_that_ends_is_beside_what_is_left_of_it(results: Results) -> None:

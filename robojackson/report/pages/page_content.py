@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from robojackson.body.skeleton import keypoint
 from robojackson.clips.quality.advice import Advice
 from robojackson.clips.quality.stability import Stability
 from robojackson.clips.video import VideoInfo
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, PLANTED, SmplSequence
-from robojackson.report.pages.evaluation_text import RESPONSES, Verdict, dancer_of, next_step
+from robojackson.report.pages.evaluation_text import Verdict, dancer_of, next_step
+from robojackson.report.pages.limb_figures import limb_rows
 from robojackson.report.pages.run_page import PageCandidate, PageContent, Plot
 from robojackson.report.plots import run_plots
 from robojackson.report.plots.feasibility_plot import feasibility_strip
-from robojackson.report.quantities import format_value
 from robojackson.report.web.player_data import Player
 
 PROGRAMS = ("robojackson", "mujoco", "gymnasium", "mediapipe", "torch", "jax", "sbx-rl",
@@ -30,14 +29,6 @@ TO_COME = (
 SHOWN_FINDINGS = 3
 NOTHING = 0.01
 """Slack that is too small to be seen, tolerances."""
-LIMBS = {
-    "head": ("pelvis", "head"),
-    "left_hand": ("left_shoulder", "left_wrist"),
-    "right_hand": ("right_shoulder", "right_wrist"),
-    "left_foot": ("left_hip", "left_ankle"),
-    "right_foot": ("right_hip", "right_ankle"),
-}
-"""The ends of each limb by its keypoint of robots: the dancer's, which the robot's follow."""
 
 
 @dataclass(frozen=True)
@@ -114,49 +105,12 @@ def page_content(results: Results, video: str | None) -> PageContent:
         has_sound=results.has_sound,
         live=results.live,
         candidates=results.candidates,
-        limbs=limb_rows(results),
+        limbs=limb_rows(results.sequence, results.reference, results.player, results.evaluation),
         beats=results.beats,
         provenance=results.provenance,
         settings=results.settings,
         next_step=next_step(results.evaluation, results.longer),
     )
-
-
-def limb_rows(results: Results) -> list[Verdict]:
-    """Return figures of head, hands and feet from all stages, and of the rollout shown."""
-    errors = results.player.error_while_up if results.player else {}
-    directions = limb_directions(results.sequence, results.reference)
-    rows = []
-    for limb, (_, end) in LIMBS.items():
-        confidence = float(results.sequence.confidence[:, keypoint(end)].mean())
-        error = errors.get(limb)
-        row = [
-            f"{confidence:.2f}",
-            f"{directions[limb]:.0f}°",
-            "–" if error is None else f"{1000 * float(error.mean()):.0f} mm",
-            *(format_value(key, results.evaluation.get(f"{key}_{limb}")) for key in RESPONSES),
-        ]
-        rows.append(Verdict(limb.replace("_", " "), "", row, False))
-    return rows
-
-
-def limb_directions(sequence: SmplSequence, reference: ReferenceMotion) -> dict[str, float]:
-    """Return the mean angle between the limbs of the reference robot and of the dancer, degrees."""
-    times = np.asarray(reference.source_time_s)
-    frames = np.clip(np.round(times * sequence.fps).astype(int), 0, len(sequence) - 1)
-    names, found = list(reference.keypoint_names), {}
-    for limb, (start, end) in LIMBS.items():
-        person = np.asarray(sequence.keypoints_w, float)[frames]
-        theirs = person[:, keypoint(end)] - person[:, keypoint(start)]
-        if not {limb, start if start in names else "pelvis"} <= set(names):
-            found[limb] = float("nan")
-            continue
-        root = names.index(start if start in names else "pelvis")
-        ours = reference.keypoints_w[:, names.index(limb)] - reference.keypoints_w[:, root]
-        lengths = np.linalg.norm(theirs, axis=1) * np.linalg.norm(ours, axis=1)
-        cosine = np.sum(theirs * ours, 1) / np.maximum(lengths, 1e-9)
-        found[limb] = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
-    return found
 
 
 def versions(programs: Sequence[str] = PROGRAMS) -> dict[str, str]:

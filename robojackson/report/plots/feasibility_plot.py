@@ -1,6 +1,7 @@
 """The feasibility strip: the steps of a reference motion that the robot can do, and the tempo."""
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -13,7 +14,8 @@ SHOWN_SLACK = 3.0
 
 
 def feasibility_strip(reference: ReferenceMotion) -> Figure:
-    """Draw the slack of every step, coloured by its remedy, above the tempo beside the clip.
+    """Draw the slack of every step, coloured by its remedy, above the tempo beside the clip, which
+    has none in the stands and steps around the clip.
 
     Raises:
         ValueError: the motion has no certificate.
@@ -23,12 +25,20 @@ def feasibility_strip(reference: ReferenceMotion) -> Figure:
     figure, (top, bottom) = figure_of(7.0, 3.0, rows=2, sharex=True)
     time_s = np.arange(len(reference)) * reference.dt
     _slack(top, time_s, reference)
-    tempo = np.gradient(np.asarray(reference.source_time_s), reference.dt)
+    tempo = _tempo(reference)
     bottom.plot(time_s, tempo, color=ACCENT, lw=1.6)
-    bottom.set_ylim(0.0, max(1.1, 1.05 * float(tempo.max())))
+    bottom.set_ylim(0.0, max(1.1, 1.05 * float(np.nan_to_num(tempo).max())))
     bottom.set_ylabel("tempo")
     bottom.set_xlabel("time, s")
     return figure
+
+
+def _tempo(reference: ReferenceMotion) -> Float[np.ndarray, " S"]:
+    """Return the tempo beside the clip at every step; NaN where the clip does not go on."""
+    found, times = np.full(len(reference), np.nan), np.asarray(reference.source_time_s)
+    if (inside := reference.in_clip).any():
+        found[inside] = np.gradient(times[inside], reference.dt)
+    return found
 
 
 def _slack(axes: Axes, time_s: np.ndarray, reference: ReferenceMotion) -> None:
