@@ -34,7 +34,8 @@ class Claim:
         treated, control: Setups that are compared.
         expected: 1 when the treated should be better, -1 when worse.
         verdict: `holds` and `reversed` only where the interval of the effect leaves out zero.
-        effect: None where it was not measured.
+        effect: None where no seed was trained with both; of no pairs where none has a figure of
+            both.
     """
 
     text: str
@@ -135,8 +136,8 @@ def _claim(
     rng: np.random.Generator,
 ) -> Claim:
     found = _effect(figures, treated, control, moves, rng)
-    if found is None:
-        return Claim(text, treated, control, expected, "not measured", None)
+    if found is None or not found.difference.count:
+        return Claim(text, treated, control, expected, "not measured", found)
     return Claim(text, treated, control, expected, _verdict(found, expected), found)
 
 

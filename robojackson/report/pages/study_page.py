@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
-from robojackson.metrics.ablation_statistics import Claim, Comparison
+from robojackson.metrics.ablation_statistics import ON_MANY, Claim, Comparison
 from robojackson.metrics.seed_statistics import Effect, Estimate
 from robojackson.report.pages.inline import own, policy
 from robojackson.report.pages.inline import render as from_template
@@ -132,6 +132,7 @@ def render(content: StudyContent) -> str:
             for move, of in groupby(content.lines, lambda line: line.move)
         ],
         effects=[(c, [_difference(found) for found in c.effects.values()]) for c in compared],
+        on_many=ON_MANY in [(c.treated, c.control) for c in compared],
         compared_on=list(compared[0].effects) if compared else [],
         paid={move: _by_reward(paid) for move, paid in content.reward_audits.items()},
         bodies=BODIES,
@@ -185,6 +186,9 @@ def sentence(claim: Claim) -> str:
     if claim.effect is None:
         return f"Not measured here: {claim.treated} or {claim.control} was not trained."
     found = claim.effect.difference
+    if not found.count:
+        both = f"{claim.treated} and {claim.control}"
+        return f"Not measured here: no seed has a figure of both {both}."
     how = {
         "holds": "Holds here",
         "reversed": "The opposite holds here",
@@ -208,7 +212,7 @@ def _by_reward(paid: RewardAudits) -> list[tuple[str, list[str]]]:
 
 
 def _difference(found: Effect | None) -> str:
-    if found is None:
+    if found is None or not found.difference.count:
         return "–"
     text = f"{found.difference.mean:+,.1f}"
     if math.isfinite(found.difference.low):
