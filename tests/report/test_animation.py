@@ -12,19 +12,31 @@ from robojackson.report.video.encoder import write_video
 FRAMES = 60
 
 
+def durations_in(animation: Path) -> list[int]:
+    """Return the duration of each picture in a file, milliseconds."""
+    durations = []
+    with Image.open(animation) as image:
+        for index in range(image.n_frames):
+            image.seek(index)
+            image.load()
+            durations.append(image.info["duration"])
+    return durations
+
+
 @pytest.mark.parametrize("kind", ["gif", "webp"])
 @pytest.mark.parametrize("fps", [5, 12, 24, 25, 30, 50])
 def test_an_animation_is_as_long_as_its_film(fps: int, kind: str, tmp_path: Path) -> None:
     pictures = [np.full((32, 48, 3), 4 * k, np.uint8) for k in range(FRAMES)]
     film = write_video(pictures, fps, tmp_path / "film.mp4")
-    durations = []
-    with Image.open(write_animation(film, tmp_path / f"film.{kind}", kind)) as image:
-        for index in range(image.n_frames):
-            image.seek(index)
-            image.load()
-            durations.append(image.info["duration"])
+    durations = durations_in(write_animation(film, tmp_path / f"film.{kind}", kind))
     assert len(durations) <= FPS * FRAMES / fps + 1
     assert sum(durations) == pytest.approx(1000 * FRAMES / fps, abs=5)
+
+
+def test_a_film_of_more_than_a_minute_is_shown_whole(tmp_path: Path) -> None:
+    pictures = [np.full((32, 48, 3), k % 250, np.uint8) for k in range(5 * 61)]
+    film = write_video(pictures, 5, tmp_path / "film.mp4")
+    assert sum(durations_in(write_animation(film, tmp_path / "film.gif", "gif"))) == 61_000
 
 
 def test_durations_are_whole_units_whose_sum_does_not_wander() -> None:

@@ -28,7 +28,7 @@ def write_animation(film: Path, out: Path, kind: str) -> Path:
         UnreadableVideo: the film cannot be read.
         StoreError: the file cannot be written.
     """
-    info = probe(film, VideoLimits(min_frames=1))
+    info = probe(film, VideoLimits(max_duration_s=None, min_frames=1))
     every = max(1, math.ceil(info.fps / FPS - ROUNDING))
     scale = min(1.0, LONGEST_PX / max(info.width, info.height))
     pictures = [
