@@ -1,5 +1,6 @@
 """The folder of a run: what `dance` leaves beside its page, by a trained policy or by a tracker."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.web.player_data import Player, player
 from robojackson.robot.model import Robot
 
-FPS, MOST_S = 30.0, 60.0
+FPS = 30.0
 ROLLOUTS = "rollout.parquet", "tracker_rollout.parquet"
 FILMS = "dance.mp4", "tracker.mp4"
 """What the policy made, else the tracker."""
@@ -29,7 +30,7 @@ class RunFolder:
         robot: The robot that danced.
         track, sequence, reference: Landmarks, person and target.
         rollout: The recorded dance.
-        shown: All of it at the moments of its film.
+        shown: All of it, 30 pictures a second from its first moment to its last.
     """
 
     robot: Robot
@@ -52,7 +53,7 @@ def read_run(folder: Path) -> RunFolder:
     sequence = SmplSequence.load(folder / "smpl.parquet")
     reference = ReferenceMotion.load(folder / "reference.parquet")
     robot = robot_of(reference)
-    shown = player(track, sequence, reference, rollout, robot, FPS, MOST_S)
+    shown = player(track, sequence, reference, rollout, robot, FPS, math.inf)
     return RunFolder(robot, track, sequence, reference, rollout, shown)
 
 

@@ -140,6 +140,17 @@ def test_a_trackers_folder_is_a_run_as_well(folder: Path, tmp_path: Path) -> Non
     assert read_run(tmp_path).robot.model.nq == load_robot("humanoid").model.nq
 
 
+def test_a_run_of_more_than_a_minute_is_whole(folder: Path, tmp_path: Path) -> None:
+    for name in ("landmarks.parquet", "smpl.parquet", "reference.parquet"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    reference = ReferenceMotion.load(REFERENCE)
+    steps = round(61.0 / reference.dt)
+    qpos = np.resize(np.asarray(reference.qpos), (steps, reference.qpos.shape[1]))
+    Rollout(reference.dt, qpos).save(tmp_path / "rollout.parquet")
+    shown = read_run(tmp_path).shown
+    assert shown.when.rollout[-1] == pytest.approx(steps - 1, abs=1 / (FPS * reference.dt))
+
+
 def test_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
     result = in_process("view", tmp_path, "--to", "gltf", "-o", tmp_path / "x.glb")
     assert (result.code != 0, "not the folder of a run" in result.err) == (True, True)
