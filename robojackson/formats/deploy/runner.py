@@ -18,7 +18,7 @@ import numpy as np
 from robojackson.formats.deploy.simulated_robot import SimulatedRobot
 
 PARSER = argparse.ArgumentParser(description=__doc__)
-PARSER.add_argument("--seconds", type=float, default=10.0, help="of the dance")
+PARSER.add_argument("--seconds", type=float, help="not given: the whole dance, at least 10 s")
 PARSER.add_argument("--soft-start", type=float, default=3.0, help="seconds, hung up")
 PARSER.add_argument("--view", action="store_true", help="MuJoCo's viewer, in real time")
 
@@ -119,7 +119,7 @@ class Runner:
         return ""
 
 
-def main(seconds: float, soft_start: float, view: bool, kind: type[Runner] = Runner) -> str:
+def main(seconds: float | None, soft_start: float, view: bool, kind: type[Runner] = Runner) -> str:
     """Hang up, fade the gains in, move to the first pose, dance, damp; return why it ended."""
     runner, stop = kind(), list[str]()
     robot, dt = runner.robot, runner.cfg["step_dt"]
@@ -134,6 +134,7 @@ def main(seconds: float, soft_start: float, view: bool, kind: type[Runner] = Run
             robot.drive(goal, min(1.0, 2 * share) * runner.kp, runner.kd)
     robot.hung, steps = None, 0
     runner.begin(0)
+    seconds = max(10.0, len(runner.roots) * dt) if seconds is None else seconds
     try:
         while not stop and steps < round(seconds / dt):
             stop += filter(None, [runner.step()])

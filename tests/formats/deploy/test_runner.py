@@ -156,6 +156,32 @@ def test_the_command_soft_starts_dances_and_damps(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("rows", "least_s"), [(20, 10.0), (1000, 15.0)])
+def test_without_seconds_the_whole_dance_is_run_and_at_least_ten_seconds(
+    pack: Pack, packages: Path, tmp_path: Path, rows: int, least_s: float
+) -> None:
+    code = f"""
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+import run
+
+class Still(run.Runner):
+    def load(self, folder):
+        super().load(folder)
+        self.roots = np.resize(self.roots, ({rows}, 7))
+
+    def step(self):
+        return ""
+
+seconds = run.PARSER.parse_args(["--view"]).seconds
+print(run.main(seconds, 0.0, False, Still))
+"""
+    result = run_bare(packages, code, str(pack.folder), cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert float(result.stdout.split()[1]) == pytest.approx(least_s, abs=pack.reference.dt)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_stops_it_by_damping(
     pack: Pack, packages: Path, tmp_path: Path, name: str
