@@ -123,10 +123,17 @@ def _deploy(
     rights = {f"may_{name}": answer for name, answer in made.pop("licences").items()}
     made["files"] = len(made["files"])
     verdict = {"verdict": {"kind": kind, "sentence": sentence}}
-    viewed = ["--view"] if has_screen() else []
-    following = {"next": shlex.join([python(), str(out / "run.py"), *viewed])}
+    following = {"next": pack_command(out)}
     figures = {"folder": str(out), "format": DEPLOY, **made, **rights}
     return figures | {"seconds": time.monotonic() - began} | verdict | following
+
+
+def pack_command(folder: Path) -> str:
+    """Return the command that runs a deploy pack, in MuJoCo's viewer where a window can be opened:
+    macOS allows it to `mjpython` alone, which the package mujoco installs."""
+    viewed = has_screen()
+    interpreter = "mjpython" if viewed and sys.platform == "darwin" else python()
+    return shlex.join([interpreter, str(folder / "run.py"), *(["--view"] if viewed else [])])
 
 
 def has_screen() -> bool:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from robojackson.cli.cards import command_line
-from robojackson.cli.exporting import export, has_screen
+from robojackson.cli.exporting import export, has_screen, pack_command
+from robojackson.cli.lifetime.interruption import python
 from robojackson.cli.training_words import pack_of
 from robojackson.errors import RejectedReference, StoreError, UnknownName
 from robojackson.files import tables
@@ -119,6 +120,15 @@ def test_a_window_is_offered_where_one_can_be_opened(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", display)
     assert has_screen() is screen
+
+
+@pytest.mark.parametrize(("platform", "interpreter"), [("darwin", "mjpython"), ("linux", python())])
+def test_the_viewer_of_a_pack_is_opened_by_the_interpreter_that_may(
+    platform: str, interpreter: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("sys.platform", platform)
+    assert pack_command(Path("PACK")) == f"{interpreter} {Path('PACK') / 'run.py'} --view"
 
 
 def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:

@@ -74,7 +74,8 @@ SAFETY = """\
 
 Nothing here has been on a real robot. All figures above are of simulations.
 
-1. Run `run.py --view` and watch the whole dance. Stop here if a row of the passport is bad.
+1. Run `run.py --view` and watch the whole dance. Stop here if a row of the passport is bad. On
+   macOS MuJoCo's viewer needs `mjpython run.py --view`.
 2. Hang the robot from a gantry with slack for the dance, feet just off the floor, 3 m free around
    it, no person within reach, and a second person at the emergency stop of the robot itself.
 3. `Runner(robot=...)` drives any object with `joints` (names, in order), `read()` (attitude wxyz,
