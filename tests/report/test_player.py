@@ -9,6 +9,7 @@ from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.pages.run_page import PageContent, render
 from robojackson.report.web.player_data import player
+from robojackson.robot.model import load_robot
 from tests.fixtures.robots import stock
 
 
@@ -36,3 +37,15 @@ def test_a_cut_dance_is_noted_on_its_page(
         shown = player(track, sequence, motion, motion.qpos, stock(), 30.0, most)
         html = render(PageContent(title="x", player=shown))
         assert ("--set render.max_seconds=1 shows the whole dance" in html) == is_cut
+
+
+def test_the_reference_has_bands_of_its_feet_whatever_its_contacts_are_called(
+    track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion
+) -> None:
+    described = stock().description
+    names = dict(zip(described.contacts, ("sole_l", "sole_r"), strict=True))
+    contacts = {names[name]: point for name, point in described.contacts.items()}
+    robot = load_robot(replace(described, contacts=contacts))
+    motion = replace(reference, contact_names=robot.contact_names, certificate=None)
+    titles = {band.title for band in player(track, sequence, motion, None, robot, 30.0, 5.0).bands}
+    assert {"reference, left foot", "reference, right foot"} <= titles

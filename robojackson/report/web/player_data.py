@@ -129,7 +129,7 @@ def player(
         data["trained_angles"] = packed(np.degrees(danced[:, 7:]))
         data["error"] = packed(1000 * apart.mean(1))
         data["ended"] = int(np.argmax(when.ended)) if when.ended.any() else len(when)
-    bands = _contact_bands(sequence, reference, when)
+    bands = _contact_bands(sequence, reference, robot, when)
     far_m = FAR * robot.description.strict.sites
     bands.append(Band("look here", attention(sequence, reference, when, errors, track, far_m)))
     shown = [band for band in bands if band.spans]
@@ -144,8 +144,10 @@ def _torques(reference: ReferenceMotion, when: Timeline) -> str | None:
 
 
 def _contact_bands(
-    sequence: SmplSequence, reference: ReferenceMotion, when: Timeline
+    sequence: SmplSequence, reference: ReferenceMotion, robot: Robot, when: Timeline
 ) -> list[Band]:
+    """Return the states of the feet of person and reference, whatever its contacts are called."""
+    side_of = {name: point.side for name, point in robot.description.contacts.items()}
     frames = np.minimum(when.frame, len(sequence) - 1)
     bands = []
     for column, side in ((0, "left"), (2, "right")):
@@ -153,7 +155,7 @@ def _contact_bands(
         state = np.where((contact == AIR).all(1), 0, np.where((contact == 1).any(1), 1, 2))
         bands.append(Band(f"person, {side} foot", _spans(state)))
     for side in ("left", "right"):
-        own = [i for i, name in enumerate(reference.contact_names) if name.startswith(side)]
+        own = [i for i, name in enumerate(reference.contact_names) if side_of.get(name) == side]
         contact = np.asarray(reference.contact)[when.step][:, own]
         if own:
             state = np.where((contact == AIR).all(1), 0, np.where((contact == 1).any(1), 1, 2))
