@@ -4,18 +4,19 @@ Pixels, origin top left. The recovered skeleton is projected by the camera of th
 moved, by the camera of the first frame and the movement of the background since.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
-from robojackson.clips.video import read_frames
 from robojackson.mocap.landmarks.blazepose import landmark
 from robojackson.mocap.reprojection import skeleton_in_image
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video import canvas
+from robojackson.report.video.clip_pictures import ClipPictures
 
 BONES = (
     ("left_shoulder", "right_shoulder"), ("left_hip", "right_hip"),
@@ -33,7 +34,7 @@ _FAINT = 0.5
 
 
 class SourceClip:
-    """Pictures of a clip, cut around the person, for some of its frames.
+    """Pictures of a clip, cut around the person, for some of its frames, fastest in their order.
 
     Args:
         source, track: The clip and its landmarks.
@@ -61,20 +62,22 @@ class SourceClip:
         over = round(box[3] * strip / (height - strip))
         self._box = box[0], box[1] - over, box[2], box[3] + over
         self._row = {int(frame): track.nearest(frame / track.fps) for frame in frames}
-        self._pictures = self._cut(source)
+        cut = partial(canvas.cut, box=self._box, size=self._size)
+        self._pictures = ClipPictures(source, self._row.values(), cut)
 
     def plain(self, frame: int) -> canvas.Picture:
         """Return the picture nearest to the time of a frame; backdrop where the clip has none."""
-        picture = self._pictures.get(self._row[frame])
-        if picture is None:
-            return np.full((self._size[1], self._size[0], 3), canvas.BACKDROP, np.uint8)
-        return picture.copy()
+        picture = self._pictures.at(self._row[frame])
+        return self._backdrop() if picture is None else picture.copy()
 
     def with_landmarks(self, frame: int) -> canvas.Picture:
         """Return the picture with the detector's landmarks."""
-        panel, row = self.plain(frame), self._row[frame]
-        if row in self._pictures:
-            _draw_person(panel, self._inside(self._found[row]), self._track.visibility[row])
+        row = self._row[frame]
+        picture = self._pictures.at(row)
+        if picture is None:
+            return self._backdrop()
+        panel = picture.copy()
+        _draw_person(panel, self._inside(self._found[row]), self._track.visibility[row])
         return panel
 
     def with_skeleton(self, frame: int) -> canvas.Picture:
@@ -82,21 +85,16 @@ class SourceClip:
         unknown."""
         if self._body is None:
             return self.with_landmarks(frame)
-        panel = self.plain(frame)
-        if self._row[frame] in self._pictures:
-            points = self._inside(self._body[min(frame, len(self._body) - 1)])
-            draw_skeleton(panel, points, max(2, panel.shape[1] // 130))
+        picture = self._pictures.at(self._row[frame])
+        if picture is None:
+            return self._backdrop()
+        panel = picture.copy()
+        points = self._inside(self._body[min(frame, len(self._body) - 1)])
+        draw_skeleton(panel, points, max(2, panel.shape[1] // 130))
         return panel
 
-    def _cut(self, source: Path) -> dict[int, canvas.Picture]:
-        needed = set(self._row.values())
-        pictures: dict[int, canvas.Picture] = {}
-        for index, image in enumerate(read_frames(source)):
-            if index in needed:
-                pictures[index] = canvas.cut(image, self._box, self._size)
-            if index >= max(needed):
-                break
-        return pictures
+    def _backdrop(self) -> canvas.Picture:
+        return np.full((self._size[1], self._size[0], 3), canvas.BACKDROP, np.uint8)
 
     def _inside(self, pixels: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
         result: np.ndarray = (pixels - self._box[:2]) * (self._size[0] / self._box[2])
