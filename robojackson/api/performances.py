@@ -50,7 +50,7 @@ class Performance:
         summary: `finished`, `danced_share`, ...: means and counts over the runs; tracker, robot.
         parts: A row a part of the programme.
         runs: A row a run.
-        rollout: What the robot did in the first run.
+        rollout: What the robot did in the first run, including a fall.
         followed: Where the programme was at the same steps: it waits for a robot that lost balance.
     """
 
@@ -136,7 +136,7 @@ def perform(
         danced_share=float(np.mean([row["danced_share"] for row in runs])),
         mpjpe_l_m=float(np.mean([row["mpjpe_l_m"] for row in runs])),
     )
-    length, motion = max(1, int(done.length[0])), planned.motion
+    length, motion = done.recorded(0), planned.motion
     shown = done.step[:length, 0]
     followed = replace(
         motion, qpos=np.asarray(motion.qpos)[shown], certificate=None,

@@ -79,6 +79,10 @@ class Performance:
     carried: Int[np.ndarray, " N"]
     given_up: tuple[tuple[str, ...], ...]
 
+    def recorded(self, i: int) -> int:
+        """Return how many steps of a run there are to show: those it was up, and its fall."""
+        return max(1, min(int(self.length[i]) + bool(self.fell[i]), len(self.step)))
+
     def runs(self, seed: int) -> list[RunRow]:
         """Return a row a run, the first with this seed."""
         return [self._run(i, seed + i) for i in range(len(self.length))]

@@ -18,6 +18,7 @@ from robojackson.rl.sim.motors import Motors
 from robojackson.rl.sim.reference_clip import Clip
 from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
+from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from tests.fixtures.robots import robot_motion
 
@@ -104,6 +105,33 @@ def test_who_is_not_pushed_and_does_not_fall_finishes_and_has_danced_all(robot: 
     assert row["danced_share"] == 1.0
     assert [part["whole"] for part in done.parts()] == [1, 1, 1]
     assert 0.0 < float(row["mpjpe_l_m"]) < 0.1  # type: ignore[arg-type]
+
+
+@pytest.mark.medium
+def test_what_is_shown_of_a_run_ends_with_its_fall(robot: Robot) -> None:
+    class Limp(Replay):
+        def targets(self, seen: TrackerInput) -> np.ndarray:
+            return 0.0 * super().targets(seen) + 1.0
+
+    certain = replace(CONFIG, runs=1, pushes=0.0, doubt_rad=3.0)  # nothing is looked ahead
+    done = perform(Limp(), programme(), robot, certain)
+    last = done.recorded(0) - 1
+    target = np.asarray(programme().motion.qpos)
+    fallen = [
+        bool(Fall.of(robot).has_fallen(done.qpos[row], target[done.step[row]])[0])
+        for row in (last - 1, last)
+    ]
+    assert (bool(done.fell[0]), fallen) == (True, [False, True])
+
+
+def test_a_run_that_stands_to_its_end_is_shown_whole(robot: Robot) -> None:
+    steps = np.zeros((7, 1), int)
+    states = np.zeros((7, 1, robot.model.nq))
+    points = np.zeros((7, 1, len(robot.keypoint_names), 3))
+    record = (steps, steps > 0, states, points, states[..., :3], np.zeros(1, int), ((),))
+    for fell in (False, True):  # one that never came to rest fell, too
+        done = Performance(programme(), np.array([7]), np.array([fell]), *record)
+        assert done.recorded(0) == 7
 
 
 def test_a_step_that_is_danced_twice_counts_once(robot: Robot) -> None:
