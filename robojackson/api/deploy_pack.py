@@ -83,7 +83,7 @@ def write_deploy_pack(
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     parts = deployed_policy(found, motion, machine)
     ingredients = with_declared(policy_ingredients(found, path, source, machine), licences or {})
-    evaluated = _evaluation_of(found, path, evaluation)
+    evaluated = _evaluation_of(found, path, motion, evaluation)
     feedback, control = None, control_of(found, machine)
     if control.feedback:
         feedback = deployed_feedback(control, motion, machine, progress, found)
@@ -93,15 +93,17 @@ def write_deploy_pack(
     return {"robot": motion.robot, **layout, **written}
 
 
-def _evaluation_of(policy: Policy, path: Path, given: FilePath | None) -> Figures | None:
-    """Return the evaluation of these networks (`own_evaluation`)."""
+def _evaluation_of(
+    policy: Policy, path: Path, motion: ReferenceMotion, given: FilePath | None
+) -> Figures | None:
+    """Return the evaluation of these networks on this motion (`own_evaluation`)."""
     own = networks_sha256(policy)
 
     def fits(found: Figures) -> bool:
         return "tracker" not in found and found.get("networks_sha256", own) == own
 
     command = f"robojackson evaluate {path} REFERENCE"
-    return own_evaluation(f"{path} as it is now", command, path.parent, given, fits)
+    return own_evaluation(f"{path} as it is now", command, path.parent, given, motion, fits)
 
 
 def deployed_policy(policy: Policy, reference: ReferenceMotion, robot: Robot) -> DeployedPolicy:

@@ -63,8 +63,8 @@ def write_feedback_pack(
         UnknownName: no such tracker.
         BadPolicy: one that needs more than a robot measures, or a network of others; another robot.
         StoreError: a file is missing or cannot be written.
-        BadConfiguration: a robot or a licence that cannot go into a pack, or another tracker's
-            evaluation.
+        BadConfiguration: a robot or a licence that cannot go into a pack, or an evaluation of
+            another tracker or motion.
     """
     described = describe_tracker(tracker) if isinstance(tracker, str) else tracker.description
     _require_onboard(described)
@@ -78,6 +78,7 @@ def write_feedback_pack(
         f"robojackson evaluate {described.name} {source}",
         source.parent,
         evaluation,
+        motion,
         lambda found: found.get("tracker") == described.name,
     )
     note = "computed from the robot's model and the motion"

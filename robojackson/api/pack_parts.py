@@ -15,7 +15,7 @@ from robojackson.formats.deploy.deployed_machine import DeployedMachine, places_
 from robojackson.formats.deploy.licence_passport import Ingredient, together
 from robojackson.formats.deploy.pack_files import OF_SOME
 from robojackson.formats.deploy.pack_readme import Figures
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors, gains
 from robojackson.robot.fall import Fall
@@ -81,7 +81,12 @@ def beside(policy: Path, given: FilePath | None, name: str, option: str) -> Path
 
 
 def own_evaluation(
-    of: str, command: str, folder: Path, given: FilePath | None, fits: Callable[[Figures], bool]
+    of: str,
+    command: str,
+    folder: Path,
+    given: FilePath | None,
+    motion: ReferenceMotion,
+    fits: Callable[[Figures], bool],
 ) -> Figures | None:
     """Return the figures of an evaluation that is given or lies in a folder; None where neither is
     of what goes into the pack.
@@ -89,17 +94,25 @@ def own_evaluation(
     Args:
         of: What goes into the pack.
         command: The command that evaluates it.
+        motion: The motion of the pack; evaluations of before December 2026 do not name theirs.
         fits: Whether an evaluation is of it.
 
     Raises:
         StoreError, BadConfiguration: the given file is missing, no evaluation or of something else.
     """
     found = _evaluation_in(folder, given)
-    if found is None or fits(found):
+    if found is None:
+        return None
+    own = poses_sha256(motion)
+    theirs = str(found.get("reference_sha256", own))
+    if not fits(found):
+        fault = f"not an evaluation of {of}"
+    elif theirs != own:
+        fault = f"an evaluation on another motion (sha256 {theirs[:12]}, here {own[:12]})"
+    else:
         return found
     reason = (
-        f"{given or folder / EVALUATION} is not an evaluation of {of}: make one with `{command} "
-        "--passport -o DIR`"
+        f"{given or folder / EVALUATION} is {fault}: make one with `{command} --passport -o DIR`"
     )
     if given is not None:
         raise BadConfiguration(reason)

@@ -11,6 +11,7 @@ from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.cli.exporting import PackInputs, export, licences_from
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
 from robojackson.formats.deploy.licence_passport import Ingredient
+from robojackson.motion.reference_motion import poses_sha256
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import networks_sha256
 from tests.fixtures.commands import in_process, robojackson
@@ -82,6 +83,21 @@ def test_an_evaluation_of_a_tracker_or_of_other_networks_is_not_in_the_pack(
     (folder / "evaluation.json").write_text(json.dumps(found))
     made = write_deploy_pack(policy, pack, evaluation=folder / "evaluation.json")
     assert made["passport_cases"] == 2
+
+
+def test_an_evaluation_on_another_motion_is_not_in_the_pack(folder: Path) -> None:
+    policy, pack, file = (
+        folder / name for name in ("policy.safetensors", "pack", "evaluation.json")
+    )
+    found = {"success": 1.0, "passport": cases(0.75)}
+    other = poses_sha256(swaying(stock(), cyclic=False))
+    file.write_text(json.dumps({**found, "reference_sha256": other}))
+    assert write_deploy_pack(policy, pack)["passport_cases"] == 0
+    with pytest.raises(BadConfiguration, match=rf"another motion \(sha256 {other[:12]}, here"):
+        write_deploy_pack(policy, pack, evaluation=file)
+    own = poses_sha256(swaying(stock()))
+    file.write_text(json.dumps({**found, "reference_sha256": own}))
+    assert write_deploy_pack(policy, pack, evaluation=file)["passport_cases"] == 2
 
 
 def test_a_pack_without_a_network_needs_no_runtime_for_networks(folder: Path) -> None:

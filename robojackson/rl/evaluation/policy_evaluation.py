@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from robojackson.errors import BadPolicy
 from robojackson.motion.floor_move import FloorMove
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.evaluate_config import TRAINED, VARIANTS
 from robojackson.rl.config.train_config import (
     ControlConfig,
@@ -134,7 +134,7 @@ def evaluate_policy(
     if reference is not given:
         qpos = FloorMove.onto(reference.qpos[:1], given.qpos[:1]).qpos(qpos)
     facts: dict[str, object] = {"variants": variants, "baselines": baselines, "reward": reward}
-    facts |= _who(policy)
+    facts |= {**_who(policy), "reference_sha256": poses_sha256(given)}
     if config.passport:
         facts |= passport_facts(passport(policy, reference, robot, config, progress))
     return Evaluation({**shown, **facts, "verdict": verdict.as_facts()}, rows, qpos)

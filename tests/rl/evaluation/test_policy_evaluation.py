@@ -8,7 +8,7 @@ import pytest
 from robojackson.errors import BadPolicy, RejectedReference, TrackTooShort
 from robojackson.geometry.rotations import heading, wrapped
 from robojackson.motion.floor_move import FloorMove
-from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.reference_motion import ReferenceMotion, poses_sha256
 from robojackson.rl.config.train_config import (
     ControlConfig,
     EvaluateConfig,
@@ -264,8 +264,10 @@ def test_a_policy_of_another_dance_is_evaluated_with_a_note(
 ) -> None:
     policy = idle(robot, sway)
     stranger = dataclasses.replace(policy, facts={**policy.facts, "reference_sha256": "other"})
-    evaluate_policy(stranger, sway, robot, EvaluateConfig(seconds=0.15, phases=1, resets=1))
+    brief = EvaluateConfig(seconds=0.15, phases=1, resets=1)
+    verdict = evaluate_policy(stranger, sway, robot, brief)
     assert "another reference motion" in caplog.text
+    assert verdict.summary["reference_sha256"] == poses_sha256(sway), "the motion of the figures"
 
 
 @pytest.mark.parametrize("steps", [0, 1, 2])
