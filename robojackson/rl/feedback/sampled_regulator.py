@@ -137,7 +137,7 @@ def _of_motion(
 ) -> Gains:
     """Return the regulator along the motion itself at an effort."""
     law = riccati(linear, action, cyclic, effort=effort)
-    return replace(bare, gain=law.gain, offset=law.offset)
+    return Gains(law.gain, law.offset, bare.qpos, bare.qvel, bare.places)
 
 
 def _searched(
