@@ -179,7 +179,11 @@ def linearised(
 
 
 def riccati(
-    linear: Linear, action: Float[np.ndarray, " nu"], cyclic: bool, pull: Pull | None = None
+    linear: Linear,
+    action: Float[np.ndarray, " nu"],
+    cyclic: bool,
+    pull: Pull | None = None,
+    effort: float = 1.0,
 ) -> Recursion:
     """Return the feedback whose cost is least over the rest of the motion.
 
@@ -188,9 +192,11 @@ def riccati(
         action: Radians that a full action moves each target.
         cyclic: Whether the path is followed by itself.
         pull: Towards what the path is pulled, of a path that is not where it shall be.
+        effort: Factor on the weight of offsets of the targets: below 1 the feedback is stiffer.
     """
     steps, size = linear.defect.shape
-    cost, effort = weights(action, size)
+    cost, stiff = weights(action, size)
+    stiff = effort * stiff
     gain, offset = np.zeros((steps, len(action), size)), np.zeros((steps, len(action)))
     values, slopes = np.zeros((steps, size, size)), np.zeros((steps, size))
     value, slope = cost, np.zeros(size)
@@ -199,7 +205,7 @@ def riccati(
     order = order if cyclic else np.concatenate([np.full(STILL, steps - 2), order])
     for t in order:
         a, b, missed = linear.by_state[t], linear.by_target[t], linear.defect[t]
-        weighted = effort + b.T @ value @ b
+        weighted = stiff + b.T @ value @ b
         wanted = b.T @ np.column_stack([value @ a, value @ missed + slope])
         wanted[:, -1] += pull.target[t]
         both = np.linalg.solve(weighted, wanted)

@@ -1,6 +1,9 @@
 """The regulator along a path beside a motion, where the motion itself cannot be held."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,7 +13,7 @@ from robojackson.rl.feedback.keypoint_rule import KeypointRule
 from robojackson.rl.feedback.nominal_path import Gains, Linear, Path, Progress, no_progress
 from robojackson.rl.feedback.path_refinement import ROUNDS, refinements
 from robojackson.rl.feedback.path_search import RULE_SHARE, PathSearch
-from robojackson.rl.feedback.path_trial import AS_MANY, POOR, Trial
+from robojackson.rl.feedback.path_trial import AS_MANY, POOR, Held, Trial
 from robojackson.rl.feedback.regulator import (
     following,
     linearised,
@@ -36,6 +39,9 @@ in all; and none after one that holds so great a share of its starts."""
 POOR_TRIES = 4
 """So many at least, however long the motion is, while little is held: what a single search of a
 long motion finds is decided by the last digits of sums, which processors round differently."""
+EFFORTS = (1.0, 0.25)
+"""Factors on the cost of the feedback's offsets: a stiffer regulator is taken where it holds much
+more."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -64,39 +70,74 @@ def sampled_regulator(
         most_rounds: Rounds of refinement at most; `ROUNDS` when None.
     """
     feet, rule = Feet(robot), KeypointRule(robot, RULE_SHARE)
-    best, motion, linear = regulator(sim, clip, action, feet.count, progress)
+    bare, motion, linear = regulator(sim, clip, action, feet.count, progress)
     trial = Trial(robot, sim, clip, action, motion)
-    held = trial.held(best)
-    if held.strictly >= ENOUGH:
-        return replace(best, held=np.array([held.strictly]))
+    best = _best_effort(trial, partial(_of_motion, bare, linear, action, clip.cyclic))
+    if best.held.strictly >= ENOUGH:
+        return best.result
     cycles = max(3, int(np.ceil(CYCLES_S / (clip.steps * clip.dt)))) if clip.cyclic else 1
     reference = reference_path(sim, clip, cycles * clip.steps)
     linear = _repeated(linear, cycles)
     tries = int(np.clip(TRIED_S / (len(reference) * clip.dt), 1, most_tries or TRIES))
     chosen = None
     for number in range(max(tries, min(POOR_TRIES, most_tries or TRIES))):
-        if number >= tries and held.strictly >= POOR:
+        if number >= tries and best.held.strictly >= POOR:
             break
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along, ended = _searched(search, sim, reference, linear, action, clip.dt, progress)
-        found = _gains(sim, clip, action, feet, path, along, reference)
-        now = trial.held(found)
-        if now.beats(held):
-            best, held, chosen = found, now, (path, along) if ended else None
-        if held.strictly >= ENOUGH:
+        gains_of = partial(_gains, sim, clip, action, feet, path, along, reference)
+        now = _best_effort(trial, gains_of)
+        if now.held.beats(best.held):
+            best, chosen = now, (path, along) if ended else None
+        if best.held.strictly >= ENOUGH:
             break
-    most, ends = held.strictly, held.to_end
+    most, ends = best.held.strictly, best.held.to_end
     for number, (path, along) in enumerate(
         refinements(sim, *chosen, reference, action, most_rounds) if chosen else ()
     ):
         progress("refined path", number + 1, ROUNDS)
-        found = _gains(sim, clip, action, feet, path, along, reference)
-        now = trial.held(found)
+        found = _gains(sim, clip, action, feet, path, along, reference, best.effort)
+        held = trial.held(found)
         least = most - AS_MANY if most < ENOUGH else max(ENOUGH, most - AS_MANY)
-        if now.strictly >= least and (most >= POOR or now.to_end >= ends - AS_MANY):
-            best, held, most = found, now, max(most, now.strictly)
-    return replace(best, held=np.array([held.strictly]))
+        if held.strictly >= least and (most >= POOR or held.to_end >= ends - AS_MANY):
+            best, most = _Tried(found, held, best.effort), max(most, held.strictly)
+    return best.result
+
+
+class _Tried(NamedTuple):
+    """A regulator, what it holds, and the factor on the cost of its offsets."""
+
+    gains: Gains
+    held: Held
+    effort: float
+
+    @property
+    def result(self) -> Gains:
+        """The regulator with the share of the starts that it holds."""
+        return replace(self.gains, held=np.array([self.held.strictly]))
+
+
+def _best_effort(trial: Trial, gains_of: Callable[[float], Gains]) -> _Tried:
+    """Return the regulator of the first effort that no later one clearly beats."""
+    first = gains_of(EFFORTS[0])
+    best = _Tried(first, trial.held(first), EFFORTS[0])
+    for effort in EFFORTS[1:]:
+        if best.held.strictly >= 1 - AS_MANY:
+            break
+        found = gains_of(effort)
+        held = trial.held(found)
+        if held.strictly > best.held.strictly + AS_MANY:
+            best = _Tried(found, held, effort)
+    return best
+
+
+def _of_motion(
+    bare: Gains, linear: Linear, action: np.ndarray, cyclic: bool, effort: float
+) -> Gains:
+    """Return the regulator along the motion itself at an effort."""
+    law = riccati(linear, action, cyclic, effort=effort)
+    return Gains(law.gain, law.offset, bare.qpos, bare.qvel, bare.places)
 
 
 def _searched(
@@ -152,6 +193,7 @@ def _gains(
     path: Path,
     linear: Linear,
     reference: Path,
+    effort: float,
 ) -> Gains:
     """Return the regulator along a path; of a motion that repeats, along its last cycle but one."""
     if clip.cyclic:
@@ -161,7 +203,7 @@ def _gains(
         qpos[:, :3] -= clip.at(np.array([first])).qpos[0, :3] - clip.at(np.array([0])).qpos[0, :3]
         path = Path(qpos, path.qvel[rows], path.targets[rows])
         linear = linearised(sim, path, following(path, clip))
-    law = riccati(linear, action, clip.cyclic)
+    law = riccati(linear, action, clip.cyclic, effort=effort)
     lead = path.targets - reference.targets[: len(path)]
     places = feet.places(path.qpos)
     return Gains(law.gain, law.offset - lead, path.qpos, path.qvel, places)
@@ -183,6 +225,7 @@ def settings() -> list[float]:
         TRIED_S,
         POOR,
         POOR_TRIES,
+        *EFFORTS,
         LOW_M,
         *path_search.settings(),
         *path_refinement.settings(),

@@ -29,6 +29,7 @@ STEPS = 40
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(path_search, "SAMPLES", 24)
     monkeypatch.setattr(path_search, "KEPT", 6)
+    monkeypatch.setattr(sampled_regulator, "EFFORTS", (1.0,))
 
 
 @pytest.fixture(scope="module")
@@ -154,6 +155,30 @@ def test_no_search_follows_one_that_holds_nearly_all(
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
     assert found().held == 0.95
     assert next(held) == 1.0, "a search more than needed"
+
+
+@pytest.mark.parametrize(
+    ("soft", "stiff", "taken"), [(0.6, 0.9, 0.25), (0.9, 0.93, 1.0), (0.97, 1.0, 1.0)]
+)
+def test_a_stiffer_regulator_is_taken_where_it_holds_clearly_more(
+    found: Callable[[], Gains],
+    clip: Clip,
+    robot: Robot,
+    plain: tuple[Gains, Path, Linear],
+    monkeypatch: pytest.MonkeyPatch,
+    soft: float,
+    stiff: float,
+    taken: float,
+) -> None:
+    held = iter([soft, stiff])
+    monkeypatch.setattr(sampled_regulator, "EFFORTS", (1.0, 0.25))
+    monkeypatch.setattr(sampled_regulator, "ENOUGH", 0.0)
+    monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
+    gains = found()
+    action = residual_scale(robot, ControlConfig())
+    law = riccati(plain[2], action / np.sqrt(taken), clip.cyclic)
+    np.testing.assert_allclose(gains.gain, law.gain, rtol=1e-6)
+    assert gains.held == (stiff if taken < 1 else soft)
 
 
 @pytest.mark.parametrize(
