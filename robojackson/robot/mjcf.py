@@ -18,6 +18,7 @@ from robojackson.robot.model_files import (
     FAULTS,
     files_of,
     first_line,
+    named_spec,
     require_model_files,
     require_sound,
     silence_mujoco,
@@ -137,7 +138,7 @@ def model_sha256(path: Path) -> str:
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
-    """Return the MJCF as it is.
+    """Return the MJCF as it is, but that its bodies and joints all have names.
 
     Raises:
         BadConfiguration: MuJoCo cannot read it.
@@ -145,7 +146,7 @@ def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
     require_model_files(path, where(description, "mjcf"))
     try:
         with limited_memory():
-            return mujoco.MjSpec.from_file(str(path))
+            return named_spec(path)
     except FAULTS as error:
         raise _unreadable(description, error) from error
 

@@ -22,6 +22,8 @@ from robojackson.robot.tree_kinematics import pose, tree
 from tests.fixtures import machine
 from tests.fixtures.robots import human
 
+TOE_JOINT = '<joint axis="0 1 0" range="-.123 .123"/>'
+
 
 @pytest.fixture(scope="module")
 def description(tmp_path_factory: pytest.TempPathFactory):
@@ -54,6 +56,27 @@ def test_the_mass_and_the_hinges_are_those_of_the_mjcf(small: Robot):
 
 def test_a_floor_is_added_where_there_is_none(small: Robot):
     assert (small.model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)).sum() == 1
+
+
+def test_bodies_and_hinges_without_a_name_get_one_and_their_motion_can_be_read(tmp_path: Path):
+    """Two empty names made a file that nothing could read."""
+    described, text = machine.description(tmp_path), machine.mjcf()
+    place = '<site name="{}_foot"'
+    for side in ("left", "right"):
+        toe = f'<body pos=".1 0 0">{TOE_JOINT}<geom size=".005" fromto="0 0 0 .01 0 0"/></body>'
+        text = text.replace(place.format(side), toe + place.format(side))
+    Path(described.mjcf).write_text(text)
+    robot = load_robot(replace(described, torque_limits={"*": 20.0, "joint_7": 3.0}))
+    plain = machine.plain_model()
+    assert len(robot.joint_names) == plain.njnt - 1 + 2
+    assert len(set(robot.joint_names)) == len(robot.joint_names)
+    assert len(set(robot.body_names)) == len(robot.body_names) == plain.nbody - 1 + 2
+    assert robot.torque_limit[6] == robot.model.actuator("joint_7").gear[0] == 3.0
+    assert robot.model.jnt_range[7, 1] == pytest.approx(0.123), "the seventh is the left toe's"
+    config = RetargetConfig(tempo=1.0, cyclic="no", repair=RepairConfig(target_share=0.0))
+    motion = retarget_motion(human("walk").part(slice(0, 12)), robot, config)
+    again = ReferenceMotion.from_bytes(motion.to_bytes(), "reference.parquet")
+    assert again.body_names == robot.body_names
 
 
 @pytest.mark.parametrize(
