@@ -246,4 +246,4 @@ def _clock_lines(timestep: float) -> list[str]:
     if not SHORTEST_S <= steps * timestep <= LONGEST_S:
         steps = max(1, round(USUAL_S / timestep))
     named = f"{steps} steps of {1e3 * timestep:g} ms of the model"
-    return [f"control_dt: {steps * timestep:g} # seconds: {named}"]
+    return [f"control_dt: {steps * timestep:.12g} # seconds: {named}"]

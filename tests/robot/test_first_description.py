@@ -153,6 +153,17 @@ def test_a_draft_names_no_setting_of_the_training(
     assert (resolved(ControlConfig(), robot).substeps, robot.substeps) == (steps, steps)
 
 
+@pytest.mark.parametrize("timestep", ["0.004166666666666667", "0.00416667", "0.003333333"])
+def test_a_control_step_is_that_of_the_model_to_the_last_digit(
+    timestep: str, tmp_path: Path
+) -> None:
+    """Six digits made a step that `robots check` refuses."""
+    text = machine.mjcf().replace("<worldbody>", f'<option timestep="{timestep}"/><worldbody>')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    assert load_robot(found).substeps == 5
+    assert found.control_dt == pytest.approx(5 * float(timestep), abs=1e-10)
+
+
 def test_odd_names_stay_text(tmp_path: Path) -> None:
     text = machine.mjcf().replace('"base"', '"no: 1"')
     _, found = drafted(model_file(tmp_path, text), tmp_path)
