@@ -164,6 +164,16 @@ def test_a_control_step_is_that_of_the_model_to_the_last_digit(
     assert found.control_dt == pytest.approx(5 * float(timestep), abs=1e-10)
 
 
+@pytest.mark.parametrize("reach", ["-2.4 -.034907", "-2.4 -.034851", "-.034958 -.034957"])
+def test_a_hinge_that_cannot_be_straight_rests_within_its_range(reach: str, tmp_path: Path) -> None:
+    text = machine.mjcf().replace('range="-2.4 0"', f'range="{reach}"')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    low, high = map(float, reach.split())
+    for side in ("left", "right"):
+        assert low <= found.rest_pose[f"{side}_elbow"] <= high
+        assert abs(found.rest_pose[f"{side}_elbow"] - high) <= 1e-4
+
+
 def test_odd_names_stay_text(tmp_path: Path) -> None:
     text = machine.mjcf().replace('"base"', '"no: 1"')
     _, found = drafted(model_file(tmp_path, text), tmp_path)
