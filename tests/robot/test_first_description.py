@@ -89,6 +89,18 @@ def test_a_machine_with_ankles_and_soles_is_described_with_its_corners(tmp_path:
     assert found.rest_pose["left_knee"] == 0.3
 
 
+@pytest.mark.parametrize("half", [0.004, 0.01, 0.02])
+def test_the_soles_of_a_box_are_its_lower_side_however_thin_it_is(
+    half: float, tmp_path: Path
+) -> None:
+    """Balls that were thicker than the box hung below it."""
+    text = machine.mjcf().replace('size=".07 .03 .01"', f'size=".07 .03 {half}"')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    soles = {ball.offset[2] - ball.radius for ball in found.contacts.values()}
+    assert found.sites["left_foot"][1][2] + max(soles) == pytest.approx(-0.02 - half, abs=2e-4)
+    assert np.ptp(list(soles)) < 2e-4
+
+
 def test_toes_are_not_the_foot(tmp_path: Path) -> None:
     plain = guess_keypoints(skeleton_of(mujoco.MjModel.from_xml_string(machine.mjcf())))
     toe = (
