@@ -26,6 +26,7 @@ from robojackson.robot.description import (
     RobotDescription,
     RobotSource,
 )
+from robojackson.robot.feet import foot_bodies
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
 from robojackson.robot.names import known, where
 from robojackson.robot.physics import MOST_SUBSTEPS, substeps_of
@@ -118,12 +119,8 @@ class Robot:
 
     @cached_property
     def foot_bodies(self) -> Int[np.ndarray, " F"]:
-        """The bodies of the contact balls and those that are welded to them."""
-        found = set(self.contact_bodies.tolist())
-        for body in range(1, self.model.nbody):  # parents come first
-            if not self.model.body_jntnum[body] and self.model.body_parentid[body] in found:
-                found.add(body)
-        return np.array(sorted(found))
+        """The bodies of the contact balls and those that are welded to them as one foot."""
+        return foot_bodies(self.model, self.contact_bodies)
 
     @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:

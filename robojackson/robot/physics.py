@@ -4,13 +4,12 @@ Metres, seconds, newton-metres. What the description does not name stays as the 
 description without these keys compiles to the stock model.
 """
 
-from collections.abc import Iterator
-
 import mujoco
 import numpy as np
 
 from robojackson.robot.actuation import per_hinge
 from robojackson.robot.description import RobotDescription
+from robojackson.robot.feet import foot_geoms
 from robojackson.robot.fixed_joints import fix_joints, remove
 from robojackson.robot.names import known, where
 
@@ -129,16 +128,8 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
         floors = [geom for geom in spec.worldbody.geoms if is_plane(geom)]
         # A body that the model has not is refused by name where contacts are bound.
         bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
-        for geom in floors + [geom for body in bodies for geom in _rigid_geoms(body)]:
+        for geom in floors + [geom for body in bodies for geom in foot_geoms(body)]:
             geom.friction = [stepping.friction, *geom.friction[1:]]
-
-
-def _rigid_geoms(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
-    """Yield the geoms of a body and of those that are welded to it."""
-    yield from body.geoms
-    for child in body.bodies:
-        if not child.joints:
-            yield from _rigid_geoms(child)
 
 
 def integrator_of(name: str) -> mujoco.mjtIntegrator:

@@ -11,6 +11,7 @@ import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.retarget.feasibility.inverse_dynamics import sole_friction
 from robojackson.retarget.solver.collision import Detector
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.reset_states import default_standing_pose
@@ -158,6 +159,39 @@ def test_a_body_that_is_welded_to_a_foot_is_of_the_foot(on_balls: Robot) -> None
     stand = default_standing_pose(on_balls)
     assert Detector(on_balls, 0.01).touches(stand[None]).floor.any()
     assert not Detector(on_balls, 0.01, feet=False).touches(stand[None]).floor.any()
+
+
+def test_a_sole_of_its_own_that_is_welded_to_the_foot_is_the_whole_foot(tmp_path: Path) -> None:
+    """A frame under the foot that carries keypoint and contacts left the foot out of the feet."""
+    described, text = machine.description(tmp_path), machine.mjcf()
+    sites, contacts = dict(described.sites), dict(described.contacts)
+    for side in ("left", "right"):
+        site = f'<site name="{side}_foot"'
+        text = text.replace(site, f'<body name="{side}_frame" pos="0 0 -.01"/>{site}')
+        for key in (f"{side}_foot", f"{side}_toe"):
+            x, y, z = sites[key][1]
+            sites[key] = (f"{side}_frame", (x, y, z + 0.01))
+    for name, ball in contacts.items():
+        contacts[name] = dataclasses.replace(ball, body=f"{ball.side}_frame")
+    Path(described.mjcf).write_text(text)
+    simulation = SimulationDescription(friction=0.4)
+    changes = {"sites": sites, "contacts": contacts, "simulation": simulation}
+    robot = load_robot(dataclasses.replace(described, **changes))
+    model = robot.model
+    names = {model.body(int(body)).name for body in robot.foot_bodies}
+    assert names == {"left_sole", "left_frame", "right_sole", "right_frame"}
+    soles = [model.geom_bodyid[g] in robot.foot_bodies for g in range(model.ngeom)]
+    assert sum(soles) == 2
+    np.testing.assert_array_equal(model.geom_friction[soles, 0], 0.4)
+    np.testing.assert_array_equal(sole_friction(robot), 0.4)
+    stand = default_standing_pose(robot)
+    assert not Detector(robot, 0.01, feet=False).touches(stand[None]).floor.any()
+
+
+def test_a_leg_that_a_foot_with_geoms_is_welded_to_is_not_of_the_foot(robot: Robot) -> None:
+    """Humanoid-v5 has no ankles."""
+    feet = {robot.model.body(int(body)).name for body in robot.foot_bodies}
+    assert feet == {"left_foot", "right_foot"}
 
 
 def with_motors(path: Path, change: Callable[[str], str]) -> str:
