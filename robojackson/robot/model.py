@@ -133,7 +133,11 @@ class Robot:
     @cached_property
     def sole_depth(self) -> float:
         """How far the soles are below the feet's keypoints in the rest pose, metres."""
-        return float((self.contact_radii - self.contact_arms[:, 2]).mean())
+        balls, names = self.description.contacts.values(), self.keypoint_names
+        height = _posed(self.model, self.rest).site_xpos[self.keypoint_sites, 2]
+        feet = height[[names.index(f"{ball.side}_foot") for ball in balls]]
+        above = self.contact_radii - self.contact_arms[:, 2]  # of the keypoint of each ball
+        return float((above + (feet - height[self.contact_keypoints])).mean())
 
 
 def load_robot(description: RobotDescription) -> Robot:

@@ -79,6 +79,23 @@ def test_bodies_and_hinges_without_a_name_get_one_and_their_motion_can_be_read(t
     assert again.body_names == robot.body_names
 
 
+def test_the_soles_are_as_deep_whichever_keypoint_of_the_foot_has_the_contacts(
+    small: Robot, tmp_path: Path
+) -> None:
+    """A contact of a toe keypoint was measured from the toe."""
+    described = machine.description(tmp_path)
+    moved = {
+        name: replace(ball, site=f"{ball.side}_toe", offset=(0.0, ball.offset[1], 0.0))
+        if "toe" in name
+        else ball
+        for name, ball in described.contacts.items()
+    }
+    robot = load_robot(replace(described, contacts=moved))
+    np.testing.assert_allclose(robot.contact_arms[1:3, 2], [-0.02, 0.0], atol=5e-3)
+    assert robot.sole_depth == pytest.approx(small.sole_depth, abs=1e-12)
+    assert small.sole_depth == pytest.approx(0.03, abs=1e-3), "the sole is 3 cm below the ankle"
+
+
 @pytest.mark.parametrize(
     ("joint", "limit"),
     [("left_knee", 40.0), ("waist", 30.0), ("left_elbow", 7.0), ("left_hip_yaw", np.inf)],
