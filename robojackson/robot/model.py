@@ -29,6 +29,7 @@ from robojackson.robot.description import (
 from robojackson.robot.feet import foot_bodies
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
 from robojackson.robot.names import known, where
+from robojackson.robot.own_bodies import own_mass
 from robojackson.robot.physics import MOST_SUBSTEPS, substeps_of
 
 __all__ = [
@@ -89,7 +90,7 @@ class Robot:
         motors = int(self.actuated.sum())
         return (
             f"Robot({self.description.name!r}, {len(self.joint_names)} hinges, {motors} motors, "
-            f"{self.model.body_mass.sum():.1f} kg)"
+            f"{own_mass(self.model).sum():.1f} kg)"
         )
 
     def save(self, path: str | PathLike[str]) -> Path:
