@@ -40,7 +40,8 @@ def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     for hinge, inertia, limit in zip(hinges, armature, limits, strict=True):
         if inertia == inertia:  # a number
             hinge.armature = inertia
-        if hinge.name not in limited:
+        if hinge.name not in limited:  # its motors are scaled where the gears are
+            hinge.actfrcrange = np.asarray(hinge.actfrcrange) * description.gear_scale
             continue
         _bound(hinge, float(limit) * description.gear_scale)
         if hinge.name in motors:

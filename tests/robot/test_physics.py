@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.formats.deploy.robot_xml import robot_xml
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.retarget.feasibility.inverse_dynamics import sole_friction
 from robojackson.retarget.solver.collision import Detector
@@ -230,6 +231,20 @@ def test_a_motor_that_the_control_law_cannot_use_is_refused(tmp_path: Path, kind
     mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace("<motor ", f"<{kind} ", 1))
     with pytest.raises(BadConfiguration, match=r"'abdomen_y' is not (a torque motor|the same in)"):
         require_trainable(altered(mjcf=mjcf, torque_limits={}))
+
+
+def test_a_factor_on_the_torque_goes_beyond_what_the_hinge_allowed(tmp_path: Path) -> None:
+    """The bound of a hinge that `torque_limits` does not name stayed as the MJCF has it."""
+    described = machine.description(tmp_path)
+    robot = load_robot(dataclasses.replace(described, gear_scale=3.0))
+    waist = robot.joint_names.index("waist")
+    assert robot.torque_limit[waist] == 90.0, "three times the 30 Nm of the MJCF"
+    written = mujoco.MjModel.from_xml_string(robot_xml(robot).decode())
+    for model in (robot.model, written):
+        data = mujoco.MjData(model)
+        data.ctrl[model.actuator_trnid[:, 0] == 1 + waist] = 50.0
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_actuator[6 + waist] == pytest.approx(90.0)
 
 
 KNEE = '<motor gear="200" joint="right_knee" name="right_knee"/>'
