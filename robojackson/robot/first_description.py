@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
+from robojackson.robot.actuation import both_ways
 from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.fall import rule_lines
@@ -132,7 +133,7 @@ def _undriven(model: mujoco.MjModel) -> dict[str, float | None]:
     found: dict[str, float | None] = {}
     for hinge in hinges:
         if hinge not in driven:
-            limit = float(np.abs(model.jnt_actfrcrange[hinge]).max())
+            limit = both_ways(model.jnt_actfrcrange[hinge])
             found[model.joint(hinge).name] = limit if model.jnt_actfrclimited[hinge] else None
     return found
 

@@ -7,7 +7,7 @@ description without these keys compiles to the stock model.
 import mujoco
 import numpy as np
 
-from robojackson.robot.actuation import per_hinge
+from robojackson.robot.actuation import both_ways, per_hinge
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.feet import foot_geoms
 from robojackson.robot.fixed_joints import fix_joints, remove
@@ -81,7 +81,7 @@ def _motors(spec: mujoco.MjSpec) -> dict[str, list[mujoco.MjsActuator]]:
 
 def _bound(hinge: mujoco.MjsJoint, limit: float) -> None:
     """Let the bound that an MJCF gives to the torque of a hinge be a limit, Nm."""
-    if np.any(hinge.actfrcrange) and not np.isclose(np.abs(hinge.actfrcrange).max(), limit):
+    if np.any(hinge.actfrcrange) and not np.isclose(both_ways(hinge.actfrcrange), limit):
         hinge.actfrcrange = [-limit, limit]
 
 
@@ -103,7 +103,7 @@ def _limit(motors: list[mujoco.MjsActuator], limit: float) -> None:
 
 def _within_force(motor: mujoco.MjsActuator, torque: float) -> float:
     """Return a torque, Nm, within what the force range of a motor allows, if it has one."""
-    force = abs(motor.gear[0]) * np.abs(motor.forcerange).max()
+    force = abs(motor.gear[0]) * both_ways(motor.forcerange)
     return float(min(torque, force)) if force > 0 else float(torque)
 
 

@@ -233,6 +233,46 @@ def test_a_motor_that_the_control_law_cannot_use_is_refused(tmp_path: Path, kind
         require_trainable(altered(mjcf=mjcf, torque_limits={}))
 
 
+@pytest.mark.parametrize(
+    ("motor", "joint"),
+    [('forcerange="-.05 .4"', ""), ('forcerange="-.4 .05"', ""),
+     ("", 'actuatorfrcrange="-10 60"'), ('forcerange="-.3 .4"', 'actuatorfrcrange="-60 10"')],
+)  # fmt: skip
+def test_of_a_force_range_that_differs_in_direction_the_smaller_side_counts(
+    motor: str, joint: str, tmp_path: Path
+) -> None:
+    """The larger did: a certificate promised torques that the robot has in one direction."""
+    path = tmp_path / "motors.xml"
+    with_motors(path, lambda text: text.replace(KNEE, KNEE.replace("/>", f" {motor}/>")))
+    path.write_text(path.read_text().replace('name="right_knee"', f'{joint} name="right_knee"', 1))
+    robot = altered(mjcf=str(path), torque_limits={})
+    require_trainable(robot)
+    knee = robot.joint_names.index("right_knee")
+    motors = Motors.of(robot.model)
+    (own,) = np.flatnonzero(motors.hinge == knee)
+    assert robot.torque_limit[knee] == pytest.approx(10.0)
+    assert motors.limit[own] == pytest.approx(10.0)
+    data = mujoco.MjData(robot.model)
+    for torque in (-10.0, 10.0):
+        data.ctrl[own] = torque / motors.gear[own]
+        mujoco.mj_forward(robot.model, data)
+        assert data.qfrc_actuator[6 + knee] == pytest.approx(torque)
+    named = altered(mjcf=str(path), torque_limits={"right_knee": 50.0})
+    data = mujoco.MjData(named.model)
+    for sign in (-1.0, 1.0):
+        data.ctrl[own] = sign
+        mujoco.mj_forward(named.model, data)
+        assert data.qfrc_actuator[6 + knee] == pytest.approx(sign * 50.0), "as the YAML says"
+
+
+def test_a_motor_that_only_pulls_is_refused(tmp_path: Path) -> None:
+    pulls = KNEE.replace("/>", ' forcerange="0 .4"/>')
+    mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace(KNEE, pulls))
+    robot = altered(mjcf=mjcf, torque_limits={})
+    with pytest.raises(BadConfiguration, match="'right_knee' or of its joint allows one direction"):
+        require_trainable(robot)
+
+
 def test_a_factor_on_the_torque_goes_beyond_what_the_hinge_allowed(tmp_path: Path) -> None:
     """The bound of a hinge that `torque_limits` does not name stayed as the MJCF has it."""
     described = machine.description(tmp_path)
