@@ -24,7 +24,7 @@ from robojackson.robot.model_files import (
     silence_mujoco,
 )
 from robojackson.robot.names import known, where
-from robojackson.robot.physics import apply_physics, is_plane
+from robojackson.robot.physics import add_floor, apply_physics
 
 ADDED = "store"
 """Prefix of an `mjcf` that `robojackson robots add` unpacks."""
@@ -122,9 +122,7 @@ def described_spec(description: RobotDescription, path: Path) -> mujoco.MjSpec:
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
-    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    add_floor(spec)
     apply_physics(spec, description)
     return spec
 

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 from robojackson.errors import BadConfiguration
 from robojackson.files.file_tree import FileTree
 from robojackson.robot.actuation import Actuation, actuation_of, per_hinge
-from robojackson.robot.checks import check_joints, check_names, check_soles, check_symmetry
+from robojackson.robot.checks import check_model, check_names, check_soles, check_symmetry
 from robojackson.robot.description import (
     KEYPOINTS,
     TOES,
@@ -151,7 +151,7 @@ def load_robot(description: RobotDescription) -> Robot:
     """
     path = mjcf_path(description)
     model = compiled(description, path)
-    check_joints(model, description)
+    check_model(model, description)
     return _bind(model, description, model_sha256(path))
 
 

@@ -11,6 +11,7 @@ from robojackson.robot.actuation import both_ways, per_hinge
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.feet import foot_geoms
 from robojackson.robot.fixed_joints import fix_joints, remove
+from robojackson.robot.model_files import free_name
 from robojackson.robot.names import known, where
 
 SAME_S = 1e-9
@@ -126,7 +127,7 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
         spec.option.ls_iterations = stepping.ls_iterations
     if stepping.friction is not None:
         soles = {point.body for point in description.contacts.values()}
-        floors = [geom for geom in spec.worldbody.geoms if is_plane(geom)]
+        floors = [geom for geom in spec.geoms if _is_floor(geom)]
         # A body that the model has not is refused by name where contacts are bound.
         bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
         for geom in floors + [geom for body in bodies for geom in foot_geoms(body)]:
@@ -138,9 +139,18 @@ def integrator_of(name: str) -> mujoco.mjtIntegrator:
     return getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
 
 
-def is_plane(geom: mujoco.MjsGeom) -> bool:
-    """Return whether a geom of a spec is an infinite floor."""
-    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE)
+def add_floor(spec: mujoco.MjSpec) -> None:
+    """Add a floor at z = 0 to a spec that has none."""
+    if any(_is_floor(geom) for geom in spec.geoms):
+        return
+    name = free_name("floor", [geom.name for geom in spec.geoms])
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name=name, type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+
+
+def _is_floor(geom: mujoco.MjsGeom) -> bool:
+    """Return whether a geom of a spec is a plane that is not there for its looks alone."""
+    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE and (geom.contype or geom.conaffinity))
 
 
 def substeps_of(control_dt: float, timestep: float) -> int | None:

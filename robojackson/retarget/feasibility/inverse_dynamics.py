@@ -160,7 +160,7 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
     model = robot.model
     touches = (model.geom_contype | model.geom_conaffinity) != 0
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
-    floor = np.flatnonzero((model.geom_bodyid == 0) & plane & touches)
+    floor = np.flatnonzero(plane & touches)
     found = np.empty(len(robot.contact_bodies))
     for index, body in enumerate(robot.contact_bodies):
         on_foot = model.body_weldid[model.geom_bodyid] == model.body_weldid[body]
