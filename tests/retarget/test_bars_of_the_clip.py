@@ -1,4 +1,4 @@
-"""The bars that decide on solving again are of the clip as the gate measures it, not of its tails.
+"""Bars hold for the clip and for its tails, apart: neither dilutes what is wrong with the other.
 
 Tails stand still, mostly, and are longer than many clips.
 """
@@ -15,14 +15,17 @@ from robojackson.retarget import danced_motion
 from robojackson.retarget.feasibility.tempo import warped
 from robojackson.retarget.feasible_motion import Feasible
 from robojackson.retarget.retarget_config import RetargetConfig
-from robojackson.retarget.scorecard_gate import BARS
+from robojackson.retarget.retargeting import assemble
+from robojackson.retarget.scorecard_gate import BARS, failures
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.targets.cycle import CycleConfig, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, every_second, targets
 from robojackson.retarget.targets.tails import TailConfig, Tailed, with_tails
 from robojackson.retarget.whole_clip import faults
+from robojackson.rl.modes.reset_states import default_standing_pose
 from robojackson.robot.model import Robot
+from robojackson.robot.tree_kinematics import pose, tree
 from tests.fixtures.robots import human
 
 CONFIG = RetargetConfig(tails=TailConfig(use="yes"), cyclic="no")
@@ -108,3 +111,45 @@ def test_a_flight_that_does_not_fall_is_removed_by_its_share_of_the_clip(
     monkeypatch.setattr(danced_motion, "_over_the_feet", lambda stiff, *_: (stiff, 0.0))
     danced_motion._solved(clip, robot, CONFIG, cast(Targets, plain), True)
     assert bool(polished) == solved_again
+
+
+STANDS, WAYS, CLIP = [(0, 60), (200, 300)], [(60, 100), (150, 200)], [(100, 150)]
+
+
+def steps_of(spans: list[tuple[int, int]]) -> np.ndarray:
+    found = np.zeros(300, bool)
+    for start, end in spans:
+        found[start:end] = True
+    return found
+
+
+@pytest.mark.parametrize(
+    ("leans", "part"),
+    [([], CLIP), ([(100, 120)], CLIP), ([(160, 180)], WAYS), ([(220, 300)], STANDS)],
+)
+def test_the_gate_refuses_what_the_robot_cannot_do_in_the_clip_its_ways_or_its_stands(
+    leans: list[tuple[int, int]], part: list[tuple[int, int]], robot: Robot
+) -> None:
+    """A robot that fell over in the last stand passed."""
+    qpos = np.repeat(default_standing_pose(robot)[None], 300, 0)
+    leaning = steps_of(leans)
+    qpos[leaning, 3], qpos[leaning, 4] = np.cos(0.175), np.sin(0.175)
+    points = np.repeat(pose(tree(robot), qpos[:1]).site_pos, 300, 0)
+    points[:, -1, 0] += 1e-3 * np.cumsum(steps_of(WAYS))
+    aims = Targets(
+        keypoints_w=points,
+        weights=np.ones(points.shape[:2]),
+        contact=np.full((300, 2), PLANTED),
+        heading=np.repeat(np.eye(3)[None], 300, 0),
+        dt=DT,
+        cycle_offset=None,
+        airborne=np.zeros(300, bool),
+    )
+    time_s = np.zeros(300)
+    card = assemble(
+        qpos, time_s, aims, aims, robot, {}, CONFIG.weights.tolerance, steps_of(CLIP)
+    ).scorecard
+    share = leaning.sum() / steps_of(part).sum()
+    assert card["infeasible_share"] == pytest.approx(share, abs=0.1)
+    assert ("infeasible_share" in failures(card)) == bool(leans)
+    assert not (leans and card["passed"])
