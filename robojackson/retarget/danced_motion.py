@@ -119,7 +119,7 @@ def _solved(
     upright = aims = tailed.aims
     found, floor_mm = optimise(aims, robot, config)
     hovering = hovers(robot, found.qpos, aims.dt, aims.cycle_offset is not None)
-    if hovering.mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
+    if hovering[tailed.clip].mean() > BARS["unsupported_share"] / 2 and aims.airborne.any():
         _log.info("removed a flight that does not fall: solving again")
         grounded = targets(clip, robot, hovering[tailed.clip], hops)
         upright = with_tails(grounded, robot, config.tails).aims

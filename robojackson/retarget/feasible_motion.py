@@ -20,6 +20,7 @@ from robojackson.retarget.scorecard_gate import LEAST_FEASIBLE
 from robojackson.retarget.solver.clip_problem import Problem
 from robojackson.retarget.solver.levenberg_marquardt import clip_to_limits, solve
 from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.retarget.targets.motion_parts import moving, parts_of
 from robojackson.retarget.whole_clip import faults, harden
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import resample
@@ -30,7 +31,6 @@ _HELPS = 0.7  # share of the excess that slowing down may leave
 _GUARD = 1.03  # a warp ends with a whole step: all tempos fall by less than that
 _LOOSE = 1e-5  # first damping: repair moves whole bodies over many steps
 _HARDLY_SLOWER = 0.97  # a tempo that is not worth a warp
-_STILL_M = 1e-6  # targets that move less a step are a stand's
 _HOPELESS = 0.5  # share of feasible steps below which a heavier weight has never been enough
 _BEHIND = 0.02  # a slowed motion that is so far behind does not come first by repair
 _REACH_S = 0.8  # beside steps that need repair, others may change so far
@@ -65,12 +65,9 @@ class Feasible:
 
     @property
     def parts(self) -> tuple[Bool[np.ndarray, " S"], ...]:
-        """Steps of the clip and, apart, those that lead into and out of it, without the stands:
-        none dilutes the other's share."""
-        points, danced = self.aims.keypoints_w, self.danced
-        moves = np.abs(np.diff(points, axis=0, append=points[-1:])).max((1, 2)) > _STILL_M
-        ways = moves & ~danced
-        return (danced, ways) if ways.any() else (danced,)
+        """Steps of the clip and, apart, those that lead into and out of it, and those of the
+        stands: none dilutes another's share."""
+        return parts_of(self.aims, self.danced)
 
 
 def make_feasible(robot: Robot, before: Feasible, config: RetargetConfig) -> Feasible:
@@ -119,8 +116,8 @@ def _best_repair(
 
 
 def feasible_share(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
-    """Return the share of feasible steps of the clip or of its tails, whichever is less: a robot
-    falls over either."""
+    """Return the share of feasible steps of the clip, of the ways into and out of it or of the
+    stands, whichever is least: a robot falls over any."""
     return _least_share(motion, _slack(robot, motion, config))
 
 
@@ -132,7 +129,7 @@ def _excess(robot: Robot, motion: Feasible, config: RetargetConfig) -> float:
     """Return the mean slack beyond the tolerance; a step without a solution counts as three
     tolerances."""
     over = np.clip(_slack(robot, motion, config) - 1.0, 0.0, 3.0)
-    return float(over[np.logical_or.reduce(motion.parts)].mean())
+    return float(over[motion.danced | moving(motion.aims)].mean())
 
 
 def _slack(robot: Robot, motion: Feasible, config: RetargetConfig) -> Float[np.ndarray, " S"]:

@@ -29,6 +29,7 @@ from robojackson.retarget.targets.clip_ends import danced_frames
 from robojackson.retarget.targets.cycle import Cycle, human_clip
 from robojackson.retarget.targets.human_clip import HumanClip
 from robojackson.retarget.targets.keypoint_targets import Targets, select_steps, targets
+from robojackson.retarget.targets.motion_parts import parts_of
 from robojackson.retarget.targets.tails import settled
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import velocities
@@ -119,8 +120,9 @@ def assemble(
 ) -> ReferenceMotion:
     """Return everything that follows from the poses, and the score card.
 
-    Figures that are means or shares are those of the steps that are `danced`. `aims` are
-    what the solver followed, perhaps leaned; `upright` is the dancer's own motion.
+    Figures that are means or shares are those of the steps that are `danced`, but that the share
+    of infeasible steps is the largest of clip, ways and stands. `aims` are what the solver
+    followed, perhaps leaned; `upright` is the dancer's own motion.
     """
     posed = pose(tree(robot), qpos)
     certified = certify(robot, qpos, aims.dt, aims.cycle_offset, tolerance)
@@ -146,6 +148,9 @@ def assemble(
     card = score(ReferenceMotion(**parts), robot, aims, upright)  # type: ignore[arg-type]
     if danced is not None and not danced.all():
         card |= _without_tails(parts, danced, robot, aims, upright)
+        infeasible = ~(certified.certificate.slack <= 1.0)
+        shares = (infeasible[part].mean() for part in parts_of(aims, danced))
+        card["infeasible_share"] = float(max(shares))
         card["passed"] = float(not failures(card))
     card["root_residual_bw"] = float(np.median(certified.missing_bw))
     return ReferenceMotion(**parts, scorecard={**card, **extra})  # type: ignore[arg-type]

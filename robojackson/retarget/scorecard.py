@@ -16,6 +16,7 @@ from robojackson.retarget.scorecard_gate import failures
 from robojackson.retarget.solver.collision import Detector
 from robojackson.retarget.targets.keypoint_targets import BONES, Targets
 from robojackson.robot.model import KEYPOINTS, Robot
+from robojackson.robot.names import HIPS
 from robojackson.robot.resampling import forward_velocities, seam_angle, seam_shift, seam_speed
 from robojackson.robot.tree_kinematics import centre_of_mass, pose, sole_velocities, tree
 
@@ -139,14 +140,14 @@ def _fidelity(motion: ReferenceMotion, robot: Robot, aims: Targets) -> dict[str,
     error = retarget_error.keypoint_error_mm(motion.keypoints_w, aims.keypoints_w, weighted)
     bones = [(KEYPOINTS.index(a), KEYPOINTS.index(b)) for a, b in BONES]
     angles = retarget_error.bone_angles_deg(motion.keypoints_w, aims.keypoints_w, bones)
-    hips = retarget_error.keypoint_error_mm(
-        motion.keypoints_w - motion.keypoints_w[:, :1],
-        aims.keypoints_w - aims.keypoints_w[:, :1],
-        weighted,
+    hips = [robot.keypoint_names.index(name) for name in HIPS]
+    middles = [each.keypoints_w[:, hips].mean(1, keepdims=True) for each in (motion, aims)]
+    from_hips = retarget_error.keypoint_error_mm(
+        motion.keypoints_w - middles[0], aims.keypoints_w - middles[1], weighted
     )
     return {
         "keypoint_mm": float(error.mean()),
-        "keypoint_pelvis_mm": float(hips.mean()),
+        "keypoint_pelvis_mm": float(from_hips.mean()),
         "keypoint_p95_mm": float(np.quantile(error, 0.95)),
         "velocity_score": velocity_score(
             motion.keypoints_w[:, weighted], aims.keypoints_w[:, weighted]

@@ -239,8 +239,12 @@ def _acceleration(points: Float[np.ndarray, "T K 3"], aims: Targets) -> float:
 
 def _slip(problem: Problem, posed: Posed) -> tuple[float, float]:
     """Return the speed of the soles that are planted in two successive steps: mean, 95th
-    percentile, m/s."""
+    percentile, m/s, of the clip or of its tails, whichever is more."""
     aims = problem.targets
     speed = sole_velocities(problem.robot, posed, aims.dt, aims.cycle_offset)
-    slip = slip_cm_s(speed, aims.contact == PLANTED) / 100
-    return (float(slip.mean()), float(np.quantile(slip, 0.95))) if len(slip) else (0.0, 0.0)
+    planted = aims.contact == PLANTED
+    danced = np.ones(len(planted), bool) if aims.danced is None else aims.danced
+    parts = (slip_cm_s(speed, planted & some[:, None]) / 100 for some in (danced, ~danced))
+    slips = [part for part in parts if len(part)] or [np.zeros(1)]
+    means, fastest = zip(*((slip.mean(), np.quantile(slip, 0.95)) for slip in slips), strict=True)
+    return float(max(means)), float(max(fastest))

@@ -125,7 +125,7 @@ def torque_limits(
 
     A motor gives gear times gain times control range, several of one joint together; one without a
     range, or a position or velocity servo, what its force range allows; the joint's own force
-    range bounds all.
+    range bounds all. Of a force range that differs in direction the smaller side counts.
     """
     limit = np.full(len(joints), np.inf)
     driven = np.zeros(len(joints))
@@ -148,7 +148,7 @@ def motor_torque(model: mujoco.MjModel, index: int) -> float:
         reach = np.abs(model.actuator_ctrlrange[index]).max()
         force = abs(float(model.actuator_gainprm[index, 0])) * reach
     if model.actuator_forcelimited[index]:
-        force = min(force, np.abs(model.actuator_forcerange[index]).max())
+        force = min(force, both_ways(model.actuator_forcerange[index]))
     return gear * float(force)
 
 
@@ -156,4 +156,12 @@ def joint_torque(model: mujoco.MjModel, joint: int) -> float:
     """Return the bound that a joint has itself on the torque of its actuators, Nm."""
     if not model.jnt_actfrclimited[joint]:
         return np.inf
-    return float(np.abs(model.jnt_actfrcrange[joint]).max())
+    return both_ways(model.jnt_actfrcrange[joint])
+
+
+def both_ways(force_range: Float[np.ndarray, "2"]) -> float:
+    """Return the largest force that a range allows in both directions; where it allows one
+    direction alone, the largest in that."""
+    low, high = (float(force) for force in force_range)
+    smaller = min(-low, high)
+    return smaller if smaller > 0 else max(-low, high)

@@ -1,4 +1,5 @@
-"""Requirements of a robot: a free root with limited hinges, mirrored sides, level soles at rest."""
+"""Requirements of a robot: a free root with limited hinges, mirrored sides, level soles at rest,
+and a floor at z = 0."""
 
 import mujoco
 import numpy as np
@@ -9,8 +10,15 @@ from robojackson.robot.names import known, matching, where
 
 _SYMMETRY_M = 1e-3
 _LEVEL_M = 0.005
+_FLOOR_M, _FLOOR_RAD = 1e-4, 1e-3
 _BONES = (("hip", "knee"), ("knee", "foot"), ("shoulder", "elbow"), ("elbow", "hand"))
 _LABELS = ("left", "right")
+
+
+def check_model(model: mujoco.MjModel, description: RobotDescription) -> None:
+    """Require the joints and the floor of a robot."""
+    check_joints(model, description)
+    check_floor(model, description)
 
 
 def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
@@ -25,6 +33,24 @@ def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
         if model.jnt_type[index] != hinge or not model.jnt_limited[index]:
             name = model.joint(index).name
             raise BadConfiguration(f"{where(description, 'mjcf')}: {name!r} is no limited hinge")
+
+
+def check_floor(model: mujoco.MjModel, description: RobotDescription) -> None:
+    """Require that every plane that can be touched is level at z = 0, where motions have their
+    floor."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    touches = (model.geom_contype | model.geom_conaffinity) != 0
+    planes = touches & (model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
+    for index in np.flatnonzero(planes):
+        height, up = float(data.geom_xpos[index, 2]), float(data.geom_xmat[index, 8])
+        tilt = float(np.arccos(np.clip(up, -1.0, 1.0)))
+        if abs(height) > _FLOOR_M or tilt > _FLOOR_RAD:
+            raise BadConfiguration(
+                f"{where(description, 'mjcf')}: the plane {model.geom(index).name!r} is at "
+                f"z = {height:g} m and {np.degrees(tilt):.3g} degrees from level, and motions "
+                "have their floor level at z = 0; put it there, or leave it out: one is added"
+            )
 
 
 def check_names(

@@ -16,7 +16,7 @@ from robojackson.robot.keypoint_guess import Guess, foot_body, geoms_of
 from robojackson.robot.limbs import SIDES, Limb, Skeleton
 
 RADIUS_M = 0.01
-"""Of a ball at a corner of a box or a mesh."""
+"""Of a ball at a corner of a box or a mesh; in a thinner box half its thickness."""
 LEVEL_M = 0.004
 """What is higher than the lowest point by more than this carries no weight."""
 SAME_M = 0.02
@@ -115,9 +115,9 @@ def _balls(skeleton: Skeleton, geom: int) -> list[_Ball]:
         ends = (centre + sign * size[1] * turn[:, 2] for sign in (-1, 1))
         return [_Ball(end, float(size[0])) for end in ends]
     if kind == BOX:
-        inner = np.maximum(size - RADIUS_M, 0.0)
+        radius = min(RADIUS_M, float(size.min()))
         signs = np.array(list(product((-1, 1), repeat=3)))
-        return [_Ball(centre + turn @ (sign * inner), RADIUS_M) for sign in signs]
+        return [_Ball(centre + turn @ (sign * (size - radius)), radius) for sign in signs]
     if kind == MESH:
         mesh = model.geom_dataid[geom]
         first = int(model.mesh_vertadr[mesh])

@@ -151,7 +151,7 @@ class RobotDescription:
         rest_pose: Hinge -> rest angle, radians; zero where it is not named.
         max_joint_speed: Speed limit of the hinges in a reference motion, rad/s.
         control_dt: Seconds a control step.
-        gear_scale: Factor on the torque of all motors.
+        gear_scale: Factor on the torque of all motors and on what their hinges allow.
         torque_limits: Hinge, or pattern with `*`, -> torque limit, Nm. A hinge without an actuator
             in the MJCF, or with a servo, gets a motor of that limit. Here and below the last
             pattern that matches counts.

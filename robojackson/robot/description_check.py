@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.errors import RoboJacksonError
-from robojackson.robot.checks import check_contact, check_joints
+from robojackson.robot.checks import check_contact, check_floor, check_joints
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.fixed_joints import fix_joints
 from robojackson.robot.mjcf import mjcf_path, read_spec
@@ -97,6 +97,7 @@ def _unknown_names(description: RobotDescription) -> Iterator[str]:
     joints = tuple(model.joint(index).name for index in range(1, model.njnt))
     sites = description.sites
     yield from _error(check_joints, model, description)
+    yield from _error(check_floor, model, description)
     for key in KEYPOINTS + (TOES if set(TOES) & set(sites) else ()):
         if key not in sites:
             yield f"{where(description, 'sites')}: missing {key}"

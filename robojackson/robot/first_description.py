@@ -15,23 +15,23 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
+from robojackson.robot.actuation import both_ways
 from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.fall import rule_lines
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
-from robojackson.robot.limbs import SIDES, Skeleton, skeleton_of
+from robojackson.robot.limbs import SIDES, skeleton_of
 from robojackson.robot.model_files import read_model
 from robojackson.robot.names import robot_name
+from robojackson.robot.rest_guess import guess_rest
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""
-BENT_RAD = 0.3
-"""How far the knees are bent at rest; hips and ankles half as far."""
-SIDEWAYS = 0.9
-"""Least share of y in the axis of a hinge that bends a leg forward."""
 SUBSTEPS, SHORTEST_S, LONGEST_S, USUAL_S = 5, 0.01, 0.03, 0.015
 """Of a control step: five steps of the model, or as many as make the usual one where that is too
 short or too long."""
+DIGITS = 12
+"""Of a control step: as a whole number of steps it is checked to a nanosecond."""
 SIDE = re.compile("left|right", re.IGNORECASE)
 PLAIN = re.compile(r"(?!(?:true|false|null)$)[A-Za-z_][\w./-]*$", re.IGNORECASE)
 
@@ -100,34 +100,6 @@ def first_description(path: Path, folder: Path, name: str) -> Draft:
     return Draft(name, "\n".join(lines) + "\n", tuple(guessed), tuple(left))
 
 
-def guess_rest(skeleton: Skeleton) -> dict[str, float]:
-    """Return knees a little bent over level feet, radians; hinges that cannot be zero are at a
-    limit."""
-    model, found = skeleton.model, dict[str, float]()
-    for hinge in np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
-        low, high = model.jnt_range[hinge]
-        if model.jnt_limited[hinge] and not low <= 0.0 <= high:
-            found[model.joint(hinge).name] = round(float(np.clip(0.0, low, high)), 4)
-    bent: dict[str, float] = {}
-    for side in SIDES:
-        leg = skeleton.limbs.get(f"{side}_leg")
-        if leg is None:
-            return found
-        turns = {"hip": -BENT_RAD / 2, "knee": BENT_RAD, "ankle": -BENT_RAD / 2}
-        for part, turn in turns.items():
-            if part == "ankle" and not leg.parts[part]:
-                continue
-            across = [h for h in leg.parts[part] if abs(skeleton.data.xaxis[h][1]) > SIDEWAYS]
-            if not across:
-                return found
-            angle = turn * float(np.sign(skeleton.data.xaxis[across[0]][1]))
-            low, high = model.jnt_range[across[0]]
-            if model.jnt_limited[across[0]] and not low < angle < high:
-                return found
-            bent[model.joint(across[0]).name] = angle
-    return found | bent
-
-
 def _model(path: Path) -> mujoco.MjModel:
     if not path.is_file():
         raise BadConfiguration(f"{path}: no such file; expected the MJCF of a robot")
@@ -161,7 +133,7 @@ def _undriven(model: mujoco.MjModel) -> dict[str, float | None]:
     found: dict[str, float | None] = {}
     for hinge in hinges:
         if hinge not in driven:
-            limit = float(np.abs(model.jnt_actfrcrange[hinge]).max())
+            limit = both_ways(model.jnt_actfrcrange[hinge])
             found[model.joint(hinge).name] = limit if model.jnt_actfrclimited[hinge] else None
     return found
 
@@ -217,7 +189,7 @@ def _rest_lines(rest: Mapping[str, float]) -> list[str]:
     if not rest:
         return ["rest_pose: {} # radians; a hinge that is not named rests at zero"]
     lines = ["rest_pose: # radians; a hinge that is not named rests at zero"]
-    return lines + [f"  {_text(name)}: {angle:g}" for name, angle in rest.items()]
+    return lines + [f"  {_text(name)}: {angle!r}" for name, angle in rest.items()]
 
 
 def _torque_lines(undriven: Mapping[str, float | None]) -> list[str]:
@@ -246,4 +218,4 @@ def _clock_lines(timestep: float) -> list[str]:
     if not SHORTEST_S <= steps * timestep <= LONGEST_S:
         steps = max(1, round(USUAL_S / timestep))
     named = f"{steps} steps of {1e3 * timestep:g} ms of the model"
-    return [f"control_dt: {steps * timestep:g} # seconds: {named}"]
+    return [f"control_dt: {steps * timestep:.{DIGITS}g} # seconds: {named}"]

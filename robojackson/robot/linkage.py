@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.geometry.rotations import quat_to_matrix
 from robojackson.robot.model import Robot
+from robojackson.robot.own_bodies import own_bodies, own_mass
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,9 @@ class Tree:
         moves: Whether hinge j moves body b.
         site_body, site_position: The keypoint sites.
         ball_body, ball_position: The centres of the balls under the feet.
-        com, mass: Centres of mass in the bodies, metres; kilograms.
+        com, mass: Centres of mass in the bodies, metres; kilograms, of the robot's own bodies.
+        own: Which bodies are the robot's.
+        root: Body with the free joint.
     """
 
     parent: Int[np.ndarray, " B"]
@@ -40,13 +43,13 @@ class Tree:
     ball_position: Float[np.ndarray, "C 3"]
     com: Float[np.ndarray, "B 3"]
     mass: Float[np.ndarray, " B"]
+    own: Bool[np.ndarray, " B"]
     root: int
 
     @cached_property
     def moved_by(self) -> Float[np.ndarray, "B nv"]:
         """1 where a degree of freedom moves a body."""
-        root = np.ones((len(self.parent), 6))
-        root[0] = 0.0
+        root = np.repeat(self.own.astype(float)[:, None], 6, axis=1)
         return np.concatenate([root, self.moves], axis=1)
 
 
@@ -75,6 +78,7 @@ def tree(robot: Robot) -> Tree:
         ball_position=model.site_pos[robot.keypoint_sites[robot.contact_keypoints]]
         + robot.contact_offsets,
         com=model.body_ipos.copy(),
-        mass=model.body_mass.copy(),
+        mass=own_mass(model),
+        own=own_bodies(model),
         root=int(model.jnt_bodyid[0]),
     )

@@ -18,12 +18,13 @@ from robojackson.robot.model_files import (
     FAULTS,
     files_of,
     first_line,
+    named_spec,
     require_model_files,
     require_sound,
     silence_mujoco,
 )
 from robojackson.robot.names import known, where
-from robojackson.robot.physics import apply_physics, is_plane
+from robojackson.robot.physics import add_floor, apply_physics
 
 ADDED = "store"
 """Prefix of an `mjcf` that `robojackson robots add` unpacks."""
@@ -121,9 +122,7 @@ def described_spec(description: RobotDescription, path: Path) -> mujoco.MjSpec:
     spec = read_spec(path, description)
     bodies = [body.name for body in spec.bodies if body.name != "world"]
     _add_sites(spec, description, bodies)
-    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    add_floor(spec)
     apply_physics(spec, description)
     return spec
 
@@ -137,7 +136,7 @@ def model_sha256(path: Path) -> str:
 
 
 def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
-    """Return the MJCF as it is.
+    """Return the MJCF as it is, but that its bodies and joints all have names.
 
     Raises:
         BadConfiguration: MuJoCo cannot read it.
@@ -145,7 +144,7 @@ def read_spec(path: Path, description: RobotDescription) -> mujoco.MjSpec:
     require_model_files(path, where(description, "mjcf"))
     try:
         with limited_memory():
-            return mujoco.MjSpec.from_file(str(path))
+            return named_spec(path)
     except FAULTS as error:
         raise _unreadable(description, error) from error
 

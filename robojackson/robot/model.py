@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 from robojackson.errors import BadConfiguration
 from robojackson.files.file_tree import FileTree
 from robojackson.robot.actuation import Actuation, actuation_of, per_hinge
-from robojackson.robot.checks import check_joints, check_names, check_soles, check_symmetry
+from robojackson.robot.checks import check_model, check_names, check_soles, check_symmetry
 from robojackson.robot.description import (
     KEYPOINTS,
     TOES,
@@ -26,8 +26,10 @@ from robojackson.robot.description import (
     RobotDescription,
     RobotSource,
 )
+from robojackson.robot.feet import foot_bodies
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
 from robojackson.robot.names import known, where
+from robojackson.robot.own_bodies import own_mass
 from robojackson.robot.physics import MOST_SUBSTEPS, substeps_of
 
 __all__ = [
@@ -88,7 +90,7 @@ class Robot:
         motors = int(self.actuated.sum())
         return (
             f"Robot({self.description.name!r}, {len(self.joint_names)} hinges, {motors} motors, "
-            f"{self.model.body_mass.sum():.1f} kg)"
+            f"{own_mass(self.model).sum():.1f} kg)"
         )
 
     def save(self, path: str | PathLike[str]) -> Path:
@@ -118,12 +120,8 @@ class Robot:
 
     @cached_property
     def foot_bodies(self) -> Int[np.ndarray, " F"]:
-        """The bodies of the contact balls and those that are welded to them."""
-        found = set(self.contact_bodies.tolist())
-        for body in range(1, self.model.nbody):  # parents come first
-            if not self.model.body_jntnum[body] and self.model.body_parentid[body] in found:
-                found.add(body)
-        return np.array(sorted(found))
+        """The bodies of the contact balls and those that are welded to them as one foot."""
+        return foot_bodies(self.model, self.contact_bodies)
 
     @cached_property
     def standing(self) -> Float[np.ndarray, " nq"]:
@@ -136,7 +134,11 @@ class Robot:
     @cached_property
     def sole_depth(self) -> float:
         """How far the soles are below the feet's keypoints in the rest pose, metres."""
-        return float((self.contact_radii - self.contact_arms[:, 2]).mean())
+        balls, names = self.description.contacts.values(), self.keypoint_names
+        height = _posed(self.model, self.rest).site_xpos[self.keypoint_sites, 2]
+        feet = height[[names.index(f"{ball.side}_foot") for ball in balls]]
+        above = self.contact_radii - self.contact_arms[:, 2]  # of the keypoint of each ball
+        return float((above + (feet - height[self.contact_keypoints])).mean())
 
 
 def load_robot(description: RobotDescription) -> Robot:
@@ -149,7 +151,7 @@ def load_robot(description: RobotDescription) -> Robot:
     """
     path = mjcf_path(description)
     model = compiled(description, path)
-    check_joints(model, description)
+    check_model(model, description)
     return _bind(model, description, model_sha256(path))
 
 

@@ -5,6 +5,7 @@ out; what MuJoCo makes of it is finite.
 """
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -141,11 +142,39 @@ def read_model(path: Path) -> mujoco.MjModel:
     silence_mujoco()
     try:
         with limited_memory():
-            model = mujoco.MjModel.from_xml_path(str(path))
+            model = named_spec(path).compile()
     except FAULTS as cause:
         raise BadConfiguration(f"{path}: {first_line(cause)}") from cause
     require_sound(model, str(path))
     return model
+
+
+def named_spec(path: Path) -> mujoco.MjSpec:
+    """Return a model as it is, but that its bodies and joints all have names.
+
+    One without a name becomes `body_7` or `joint_7`, by its place in the file, so that files and
+    descriptions can name it; a free joint, which they do not name, stays as it is.
+    """
+    spec = mujoco.MjSpec.from_file(str(path))
+    for kind, parts in (("body", spec.bodies), ("joint", spec.joints)):
+        taken = {part.name for part in parts}
+        for place, part in enumerate(parts):
+            if not part.name and not (kind == "joint" and _is_free(part)):
+                part.name = free_name(f"{kind}_{place}", taken)
+                taken.add(part.name)
+    return spec
+
+
+def _is_free(joint: mujoco.MjsJoint) -> bool:
+    """Return whether a joint of a spec is a free one."""
+    return bool(joint.type == mujoco.mjtJoint.mjJNT_FREE)
+
+
+def free_name(name: str, taken: Collection[str]) -> str:
+    """Return a name, with as many underscores behind it as make it no name that is taken."""
+    while name in taken:
+        name += "_"
+    return name
 
 
 def first_line(error: Exception) -> str:

@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from robojackson.errors import UnknownName
 from robojackson.robot.description import RobotDescription
 
-PELVIS = "pelvis"
+PELVIS, HIPS = "pelvis", ("left_hip", "right_hip")
 FEET, HANDS = ("left_foot", "right_foot"), ("left_hand", "right_hand")
 """Keypoints that every robot has."""
 LONGEST_NAME = 64

@@ -4,14 +4,14 @@ Metres, seconds, newton-metres. What the description does not name stays as the 
 description without these keys compiles to the stock model.
 """
 
-from collections.abc import Iterator
-
 import mujoco
 import numpy as np
 
-from robojackson.robot.actuation import per_hinge
+from robojackson.robot.actuation import both_ways, per_hinge
 from robojackson.robot.description import RobotDescription
+from robojackson.robot.feet import foot_geoms
 from robojackson.robot.fixed_joints import fix_joints, remove
+from robojackson.robot.model_files import free_name
 from robojackson.robot.names import known, where
 
 SAME_S = 1e-9
@@ -41,7 +41,8 @@ def apply_physics(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     for hinge, inertia, limit in zip(hinges, armature, limits, strict=True):
         if inertia == inertia:  # a number
             hinge.armature = inertia
-        if hinge.name not in limited:
+        if hinge.name not in limited:  # its motors are scaled where the gears are
+            hinge.actfrcrange = np.asarray(hinge.actfrcrange) * description.gear_scale
             continue
         _bound(hinge, float(limit) * description.gear_scale)
         if hinge.name in motors:
@@ -81,7 +82,7 @@ def _motors(spec: mujoco.MjSpec) -> dict[str, list[mujoco.MjsActuator]]:
 
 def _bound(hinge: mujoco.MjsJoint, limit: float) -> None:
     """Let the bound that an MJCF gives to the torque of a hinge be a limit, Nm."""
-    if np.any(hinge.actfrcrange) and not np.isclose(np.abs(hinge.actfrcrange).max(), limit):
+    if np.any(hinge.actfrcrange) and not np.isclose(both_ways(hinge.actfrcrange), limit):
         hinge.actfrcrange = [-limit, limit]
 
 
@@ -103,7 +104,7 @@ def _limit(motors: list[mujoco.MjsActuator], limit: float) -> None:
 
 def _within_force(motor: mujoco.MjsActuator, torque: float) -> float:
     """Return a torque, Nm, within what the force range of a motor allows, if it has one."""
-    force = abs(motor.gear[0]) * np.abs(motor.forcerange).max()
+    force = abs(motor.gear[0]) * both_ways(motor.forcerange)
     return float(min(torque, force)) if force > 0 else float(torque)
 
 
@@ -126,19 +127,11 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
         spec.option.ls_iterations = stepping.ls_iterations
     if stepping.friction is not None:
         soles = {point.body for point in description.contacts.values()}
-        floors = [geom for geom in spec.worldbody.geoms if is_plane(geom)]
+        floors = [geom for geom in spec.geoms if _is_floor(geom)]
         # A body that the model has not is refused by name where contacts are bound.
         bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
-        for geom in floors + [geom for body in bodies for geom in _rigid_geoms(body)]:
+        for geom in floors + [geom for body in bodies for geom in foot_geoms(body)]:
             geom.friction = [stepping.friction, *geom.friction[1:]]
-
-
-def _rigid_geoms(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
-    """Yield the geoms of a body and of those that are welded to it."""
-    yield from body.geoms
-    for child in body.bodies:
-        if not child.joints:
-            yield from _rigid_geoms(child)
 
 
 def integrator_of(name: str) -> mujoco.mjtIntegrator:
@@ -146,9 +139,18 @@ def integrator_of(name: str) -> mujoco.mjtIntegrator:
     return getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}")
 
 
-def is_plane(geom: mujoco.MjsGeom) -> bool:
-    """Return whether a geom of a spec is an infinite floor."""
-    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE)
+def add_floor(spec: mujoco.MjSpec) -> None:
+    """Add a floor at z = 0 to a spec that has none."""
+    if any(_is_floor(geom) for geom in spec.geoms):
+        return
+    name = free_name("floor", [geom.name for geom in spec.geoms])
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name=name, type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+
+
+def _is_floor(geom: mujoco.MjsGeom) -> bool:
+    """Return whether a geom of a spec is a plane that is not there for its looks alone."""
+    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE and (geom.contype or geom.conaffinity))
 
 
 def substeps_of(control_dt: float, timestep: float) -> int | None:

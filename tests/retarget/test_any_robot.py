@@ -22,6 +22,8 @@ from robojackson.robot.tree_kinematics import pose, tree
 from tests.fixtures import machine
 from tests.fixtures.robots import human
 
+TOE_JOINT = '<joint axis="0 1 0" range="-.123 .123"/>'
+
 
 @pytest.fixture(scope="module")
 def description(tmp_path_factory: pytest.TempPathFactory):
@@ -54,6 +56,44 @@ def test_the_mass_and_the_hinges_are_those_of_the_mjcf(small: Robot):
 
 def test_a_floor_is_added_where_there_is_none(small: Robot):
     assert (small.model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)).sum() == 1
+
+
+def test_bodies_and_hinges_without_a_name_get_one_and_their_motion_can_be_read(tmp_path: Path):
+    """Two empty names made a file that nothing could read."""
+    described, text = machine.description(tmp_path), machine.mjcf()
+    place = '<site name="{}_foot"'
+    for side in ("left", "right"):
+        toe = f'<body pos=".1 0 0">{TOE_JOINT}<geom size=".005" fromto="0 0 0 .01 0 0"/></body>'
+        text = text.replace(place.format(side), toe + place.format(side))
+    Path(described.mjcf).write_text(text)
+    robot = load_robot(replace(described, torque_limits={"*": 20.0, "joint_7": 3.0}))
+    plain = machine.plain_model()
+    assert len(robot.joint_names) == plain.njnt - 1 + 2
+    assert len(set(robot.joint_names)) == len(robot.joint_names)
+    assert len(set(robot.body_names)) == len(robot.body_names) == plain.nbody - 1 + 2
+    assert robot.torque_limit[6] == robot.model.actuator("joint_7").gear[0] == 3.0
+    assert robot.model.jnt_range[7, 1] == pytest.approx(0.123), "the seventh is the left toe's"
+    config = RetargetConfig(tempo=1.0, cyclic="no", repair=RepairConfig(target_share=0.0))
+    motion = retarget_motion(human("walk").part(slice(0, 12)), robot, config)
+    again = ReferenceMotion.from_bytes(motion.to_bytes(), "reference.parquet")
+    assert again.body_names == robot.body_names
+
+
+def test_the_soles_are_as_deep_whichever_keypoint_of_the_foot_has_the_contacts(
+    small: Robot, tmp_path: Path
+) -> None:
+    """A contact of a toe keypoint was measured from the toe."""
+    described = machine.description(tmp_path)
+    moved = {
+        name: replace(ball, site=f"{ball.side}_toe", offset=(0.0, ball.offset[1], 0.0))
+        if "toe" in name
+        else ball
+        for name, ball in described.contacts.items()
+    }
+    robot = load_robot(replace(described, contacts=moved))
+    np.testing.assert_allclose(robot.contact_arms[1:3, 2], [-0.02, 0.0], atol=5e-3)
+    assert robot.sole_depth == pytest.approx(small.sole_depth, abs=1e-12)
+    assert small.sole_depth == pytest.approx(0.03, abs=1e-3), "the sole is 3 cm below the ankle"
 
 
 @pytest.mark.parametrize(

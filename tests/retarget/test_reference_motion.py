@@ -9,9 +9,12 @@ import pytest
 from robojackson.motion.smpl_sequence import PLANTED
 from robojackson.retarget.retarget_config import RetargetConfig
 from robojackson.retarget.retargeting import retarget_motion
+from robojackson.retarget.scorecard import score
 from robojackson.retarget.scorecard_gate import check, failures
 from robojackson.retarget.targets.human_clip import at_steps, labels_at
+from robojackson.retarget.targets.keypoint_targets import Targets
 from robojackson.robot.model import Robot
+from robojackson.robot.names import HIPS
 from robojackson.robot.resampling import seam_angle
 from tests.fixtures.robots import human, robot_motion, stock
 
@@ -128,6 +131,31 @@ def test_fidelity_is_reported_against_the_dancer_and_not_against_what_was_leaned
     assert card["lean_deg"] > 1
     assert 0.3 * head_mm < card["keypoint_mm"] < head_mm
     assert card["keypoint_leaned_mm"] < card["keypoint_pelvis_mm"] < card["keypoint_mm"]
+
+
+@pytest.mark.parametrize("apart_m", [0.0, 0.05])
+def test_the_error_from_the_pelvis_is_one_of_the_pose_wherever_its_keypoint_is(apart_m: float):
+    """The target of the pelvis is the middle of the hips, 3 cm below the G1's keypoint."""
+    robot, motion = stock(), robot_motion("hip_shake")
+    points, hips = motion.keypoints_w, [1, 2]
+    assert [motion.keypoint_names[column] for column in (0, *hips)] == ["pelvis", *HIPS]
+    own = np.einsum("k,tkx->tx", [0.5, 0.5], points[:, hips])[:, None]
+    aims = Targets(
+        keypoints_w=own + 0.9 * (points - own) + [1.0, 2.0, 3.0],
+        weights=np.ones(points.shape[:2]),
+        contact=motion.contact,
+        heading=np.repeat(np.eye(3)[None], len(motion), 0),
+        dt=motion.dt,
+        cycle_offset=motion.cycle_offset,
+        airborne=np.zeros(len(motion), bool),
+    )
+    moved = points.copy()
+    moved[:, 0, 2] += apart_m
+    weighted = robot.keypoint_weights > 0
+    assert not weighted[0]
+    far = np.sqrt(np.sum((points - own)[:, weighted] ** 2, -1))
+    card = score(replace(motion, keypoints_w=moved), robot, aims)
+    assert card["keypoint_pelvis_mm"] == pytest.approx(1e3 * 0.1 * far.mean(), rel=1e-9)
 
 
 def test_the_literal_mapping_breaks_joint_limits_and_the_metric_sees_it():

@@ -1,13 +1,18 @@
 """All that is wrong with a description is reported in one go, a line each."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
+from robojackson.errors import BadConfiguration
 from robojackson.robot.description import ContactPoint, RobotDescription
 from robojackson.robot.description_check import problems
 from robojackson.robot.mjcf import mjcf_path
+from robojackson.robot.model import load_robot
 from tests.fixtures.robots import description
 
 
@@ -60,6 +65,54 @@ def test_a_root_that_does_not_stand_upright_and_face_along_x_is_reported(
     (tmp_path / "turned.xml").write_text(turned)
     message_text = problems(replace(humanoid, mjcf=str(tmp_path / "turned.xml")))
     assert any("root_body: the axes of 'torso'" in line for line in message_text) == wrong
+
+
+PLANE = '<geom name="{}" type="plane" size="9 9 1" {}/>'
+
+
+def with_floor(folder: Path, humanoid: RobotDescription, floor: str) -> RobotDescription:
+    """Write Humanoid-v5 with another floor."""
+    text, count = re.subn(r'<geom [^>]*name="floor"[^>]*/>', floor, mjcf_path(humanoid).read_text())
+    assert count, "one of them is a comment"
+    (folder / "floor.xml").write_text(text)
+    return replace(humanoid, mjcf=str(folder / "floor.xml"))
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [('pos="0 0 -.5"', r"z = -0\.5 m"), ('euler="0 5 0"', "5 degrees from level"),
+     ('pos="1 2 0" euler="0 0 30"', "")],
+)  # fmt: skip
+def test_a_floor_that_is_not_level_at_zero_is_refused(
+    place: str, words: str, humanoid: RobotDescription, tmp_path: Path
+) -> None:
+    """Motions were made for a floor at z = 0 all the same."""
+    described = with_floor(tmp_path, humanoid, PLANE.format("ground", place))
+    found = problems(described)
+    if not words:
+        assert found == []
+        return
+    (line,) = found
+    assert re.search(f"mjcf: the plane 'ground' is at .*{words}", line)
+    with pytest.raises(BadConfiguration, match="the plane 'ground'"):
+        load_robot(described)
+
+
+@pytest.mark.parametrize(
+    "floor",
+    ['<geom name="floor" type="box" size="9 9 .1" pos="0 0 -.1"/>',
+     PLANE.format("floor", 'pos="0 0 -.5" contype="0" conaffinity="0"'), ""],
+)  # fmt: skip
+def test_a_model_without_a_plane_that_can_be_touched_gets_one_at_zero(
+    floor: str, humanoid: RobotDescription, tmp_path: Path
+) -> None:
+    described = with_floor(tmp_path, humanoid, floor)
+    assert problems(described) == []
+    model = load_robot(described).model
+    touches = (model.geom_contype | model.geom_conaffinity) != 0
+    (plane,) = np.flatnonzero((model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & touches)
+    assert model.geom(plane).name == ("floor_" if floor else "floor")
+    assert model.geom_pos[plane, 2] == 0.0
 
 
 def test_limbs_of_different_length_are_reported(humanoid: RobotDescription) -> None:

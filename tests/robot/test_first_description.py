@@ -89,6 +89,18 @@ def test_a_machine_with_ankles_and_soles_is_described_with_its_corners(tmp_path:
     assert found.rest_pose["left_knee"] == 0.3
 
 
+@pytest.mark.parametrize("half", [0.004, 0.01, 0.02])
+def test_the_soles_of_a_box_are_its_lower_side_however_thin_it_is(
+    half: float, tmp_path: Path
+) -> None:
+    """Balls that were thicker than the box hung below it."""
+    text = machine.mjcf().replace('size=".07 .03 .01"', f'size=".07 .03 {half}"')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    soles = {ball.offset[2] - ball.radius for ball in found.contacts.values()}
+    assert found.sites["left_foot"][1][2] + max(soles) == pytest.approx(-0.02 - half, abs=2e-4)
+    assert np.ptp(list(soles)) < 2e-4
+
+
 def test_toes_are_not_the_foot(tmp_path: Path) -> None:
     plain = guess_keypoints(skeleton_of(mujoco.MjModel.from_xml_string(machine.mjcf())))
     toe = (
@@ -151,6 +163,27 @@ def test_a_draft_names_no_setting_of_the_training(
     assert f"{steps} steps of {1e3 * timestep:g} ms" in draft.text
     robot = load_robot(found)
     assert (resolved(ControlConfig(), robot).substeps, robot.substeps) == (steps, steps)
+
+
+@pytest.mark.parametrize("timestep", ["0.004166666666666667", "0.00416667", "0.003333333"])
+def test_a_control_step_is_that_of_the_model_to_the_last_digit(
+    timestep: str, tmp_path: Path
+) -> None:
+    """Six digits made a step that `robots check` refuses."""
+    text = machine.mjcf().replace("<worldbody>", f'<option timestep="{timestep}"/><worldbody>')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    assert load_robot(found).substeps == 5
+    assert found.control_dt == pytest.approx(5 * float(timestep), abs=1e-10)
+
+
+@pytest.mark.parametrize("reach", ["-2.4 -.034907", "-2.4 -.034851", "-.034958 -.034957"])
+def test_a_hinge_that_cannot_be_straight_rests_within_its_range(reach: str, tmp_path: Path) -> None:
+    text = machine.mjcf().replace('range="-2.4 0"', f'range="{reach}"')
+    _, found = drafted(model_file(tmp_path, text), tmp_path)
+    low, high = map(float, reach.split())
+    for side in ("left", "right"):
+        assert low <= found.rest_pose[f"{side}_elbow"] <= high
+        assert abs(found.rest_pose[f"{side}_elbow"] - high) <= 1e-4
 
 
 def test_odd_names_stay_text(tmp_path: Path) -> None:

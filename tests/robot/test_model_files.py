@@ -87,3 +87,13 @@ def test_the_meshes_of_a_urdf_belong_to_it(tmp_path: Path, name: str) -> None:
     mesh = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
     path.write_text(f'<robot name="r"><link name="base">{mesh}</link></robot>')
     assert files_of(path) == [path, tmp_path / "a.stl"]
+
+
+def test_a_part_without_a_name_gets_one_that_is_free_and_the_others_keep_theirs(
+    tmp_path: Path,
+) -> None:
+    ball = '<geom size=".1" mass="1"/>'
+    bodies = f'<body>{ball}<freejoint/><body name="body_1">{ball}<joint/></body></body>'
+    model = read_model(mjcf(tmp_path, f"<worldbody>{bodies}</worldbody>"))
+    assert [model.body(i).name for i in range(3)] == ["world", "body_1_", "body_1"]
+    assert [model.joint(i).name for i in range(2)] == ["", "joint_1"]

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration, UnknownName
+from robojackson.formats.deploy.robot_xml import robot_xml
 from robojackson.pipeline.robot_descriptions import describe_robot
+from robojackson.retarget.feasibility.inverse_dynamics import sole_friction
 from robojackson.retarget.solver.collision import Detector
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.modes.reset_states import default_standing_pose
@@ -160,6 +162,39 @@ def test_a_body_that_is_welded_to_a_foot_is_of_the_foot(on_balls: Robot) -> None
     assert not Detector(on_balls, 0.01, feet=False).touches(stand[None]).floor.any()
 
 
+def test_a_sole_of_its_own_that_is_welded_to_the_foot_is_the_whole_foot(tmp_path: Path) -> None:
+    """A frame under the foot that carries keypoint and contacts left the foot out of the feet."""
+    described, text = machine.description(tmp_path), machine.mjcf()
+    sites, contacts = dict(described.sites), dict(described.contacts)
+    for side in ("left", "right"):
+        site = f'<site name="{side}_foot"'
+        text = text.replace(site, f'<body name="{side}_frame" pos="0 0 -.01"/>{site}')
+        for key in (f"{side}_foot", f"{side}_toe"):
+            x, y, z = sites[key][1]
+            sites[key] = (f"{side}_frame", (x, y, z + 0.01))
+    for name, ball in contacts.items():
+        contacts[name] = dataclasses.replace(ball, body=f"{ball.side}_frame")
+    Path(described.mjcf).write_text(text)
+    simulation = SimulationDescription(friction=0.4)
+    changes = {"sites": sites, "contacts": contacts, "simulation": simulation}
+    robot = load_robot(dataclasses.replace(described, **changes))
+    model = robot.model
+    names = {model.body(int(body)).name for body in robot.foot_bodies}
+    assert names == {"left_sole", "left_frame", "right_sole", "right_frame"}
+    soles = [model.geom_bodyid[g] in robot.foot_bodies for g in range(model.ngeom)]
+    assert sum(soles) == 2
+    np.testing.assert_array_equal(model.geom_friction[soles, 0], 0.4)
+    np.testing.assert_array_equal(sole_friction(robot), 0.4)
+    stand = default_standing_pose(robot)
+    assert not Detector(robot, 0.01, feet=False).touches(stand[None]).floor.any()
+
+
+def test_a_leg_that_a_foot_with_geoms_is_welded_to_is_not_of_the_foot(robot: Robot) -> None:
+    """Humanoid-v5 has no ankles."""
+    feet = {robot.model.body(int(body)).name for body in robot.foot_bodies}
+    assert feet == {"left_foot", "right_foot"}
+
+
 def with_motors(path: Path, change: Callable[[str], str]) -> str:
     """Write the stock humanoid with other actuators; return the path of its MJCF."""
     found = importlib.util.find_spec("gymnasium")
@@ -196,6 +231,60 @@ def test_a_motor_that_the_control_law_cannot_use_is_refused(tmp_path: Path, kind
     mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace("<motor ", f"<{kind} ", 1))
     with pytest.raises(BadConfiguration, match=r"'abdomen_y' is not (a torque motor|the same in)"):
         require_trainable(altered(mjcf=mjcf, torque_limits={}))
+
+
+@pytest.mark.parametrize(
+    ("motor", "joint"),
+    [('forcerange="-.05 .4"', ""), ('forcerange="-.4 .05"', ""),
+     ("", 'actuatorfrcrange="-10 60"'), ('forcerange="-.3 .4"', 'actuatorfrcrange="-60 10"')],
+)  # fmt: skip
+def test_of_a_force_range_that_differs_in_direction_the_smaller_side_counts(
+    motor: str, joint: str, tmp_path: Path
+) -> None:
+    """The larger did: a certificate promised torques that the robot has in one direction."""
+    path = tmp_path / "motors.xml"
+    with_motors(path, lambda text: text.replace(KNEE, KNEE.replace("/>", f" {motor}/>")))
+    path.write_text(path.read_text().replace('name="right_knee"', f'{joint} name="right_knee"', 1))
+    robot = altered(mjcf=str(path), torque_limits={})
+    require_trainable(robot)
+    knee = robot.joint_names.index("right_knee")
+    motors = Motors.of(robot.model)
+    (own,) = np.flatnonzero(motors.hinge == knee)
+    assert robot.torque_limit[knee] == pytest.approx(10.0)
+    assert motors.limit[own] == pytest.approx(10.0)
+    data = mujoco.MjData(robot.model)
+    for torque in (-10.0, 10.0):
+        data.ctrl[own] = torque / motors.gear[own]
+        mujoco.mj_forward(robot.model, data)
+        assert data.qfrc_actuator[6 + knee] == pytest.approx(torque)
+    named = altered(mjcf=str(path), torque_limits={"right_knee": 50.0})
+    data = mujoco.MjData(named.model)
+    for sign in (-1.0, 1.0):
+        data.ctrl[own] = sign
+        mujoco.mj_forward(named.model, data)
+        assert data.qfrc_actuator[6 + knee] == pytest.approx(sign * 50.0), "as the YAML says"
+
+
+def test_a_motor_that_only_pulls_is_refused(tmp_path: Path) -> None:
+    pulls = KNEE.replace("/>", ' forcerange="0 .4"/>')
+    mjcf = with_motors(tmp_path / "m.xml", lambda text: text.replace(KNEE, pulls))
+    robot = altered(mjcf=mjcf, torque_limits={})
+    with pytest.raises(BadConfiguration, match="'right_knee' or of its joint allows one direction"):
+        require_trainable(robot)
+
+
+def test_a_factor_on_the_torque_goes_beyond_what_the_hinge_allowed(tmp_path: Path) -> None:
+    """The bound of a hinge that `torque_limits` does not name stayed as the MJCF has it."""
+    described = machine.description(tmp_path)
+    robot = load_robot(dataclasses.replace(described, gear_scale=3.0))
+    waist = robot.joint_names.index("waist")
+    assert robot.torque_limit[waist] == 90.0, "three times the 30 Nm of the MJCF"
+    written = mujoco.MjModel.from_xml_string(robot_xml(robot).decode())
+    for model in (robot.model, written):
+        data = mujoco.MjData(model)
+        data.ctrl[model.actuator_trnid[:, 0] == 1 + waist] = 50.0
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_actuator[6 + waist] == pytest.approx(90.0)
 
 
 KNEE = '<motor gear="200" joint="right_knee" name="right_knee"/>'

@@ -9,7 +9,7 @@ import numpy as np
 from robojackson.errors import BadConfiguration
 from robojackson.robot.mjcf import mjcf_path, read_spec
 from robojackson.robot.model import Robot
-from robojackson.robot.physics import apply_physics, is_plane
+from robojackson.robot.physics import add_floor, apply_physics
 
 TOLERANCE = 1e-4
 """Largest relative difference between a figure of the robot and of its MJCF, which has few
@@ -26,9 +26,7 @@ def robot_xml(robot: Robot) -> bytes:
     """
     description = robot.description
     spec = read_spec(mjcf_path(description), description)
-    if not any(is_plane(geom) for geom in spec.worldbody.geoms):
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="floor", type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
+    add_floor(spec)
     apply_physics(spec, description)
     for actuator in spec.actuators:
         actuator.gear = np.asarray(actuator.gear) * description.gear_scale

@@ -15,6 +15,7 @@ from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
 from robojackson.retarget.feasibility.force_model import once_a_robot, unconstrained
 from robojackson.retarget.targets.ground_contact import GRAVITY
 from robojackson.robot.model import Robot
+from robojackson.robot.own_bodies import own_mass
 from robojackson.robot.resampling import accelerations, velocities
 from robojackson.robot.tree_kinematics import Posed, pose, tree
 
@@ -45,7 +46,7 @@ class FreeSpace:
 
 def body_weight(robot: Robot) -> float:
     """Return the weight of the robot, newtons."""
-    return float(robot.model.body_mass.sum()) * GRAVITY
+    return float(own_mass(robot.model).sum()) * GRAVITY
 
 
 def free_space(
@@ -159,7 +160,7 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
     model = robot.model
     touches = (model.geom_contype | model.geom_conaffinity) != 0
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
-    floor = np.flatnonzero((model.geom_bodyid == 0) & plane & touches)
+    floor = np.flatnonzero(plane & touches)
     found = np.empty(len(robot.contact_bodies))
     for index, body in enumerate(robot.contact_bodies):
         on_foot = model.body_weldid[model.geom_bodyid] == model.body_weldid[body]

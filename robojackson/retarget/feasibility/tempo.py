@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from robojackson.retarget.feasibility import contact_wrench, inverse_dynamics
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
 from robojackson.retarget.feasibility.inverse_dynamics import FreeSpace
-from robojackson.retarget.targets.keypoint_targets import Targets
+from robojackson.retarget.targets.keypoint_targets import Targets, select_steps
 from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import pose
 
@@ -110,14 +110,8 @@ def warp(rate: Float[np.ndarray, " S"], ring: bool) -> Float[np.ndarray, " M"]:
 def warped(aims: Targets, steps: Float[np.ndarray, " M"]) -> Targets:
     """Return the targets at fractional steps."""
     nearest = np.round(steps).astype(int) % len(aims)
-    return replace(
-        aims,
-        keypoints_w=_between(aims.keypoints_w, steps, aims.cycle_offset),
-        weights=aims.weights[nearest],
-        contact=aims.contact[nearest],
-        heading=aims.heading[nearest],
-        airborne=aims.airborne[nearest],
-    )
+    points = _between(aims.keypoints_w, steps, aims.cycle_offset)
+    return replace(select_steps(aims, nearest), keypoints_w=points)
 
 
 def times_at(

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.retarget.feasibility.force_model import once_a_robot
 from robojackson.robot.model import Robot
+from robojackson.robot.own_bodies import fixed_bodies
 from robojackson.robot.tree_kinematics import Posed, Tree, placed
 
 _FLOOR_BIT = 1 << 30
@@ -27,7 +28,7 @@ class Touches:
         position: Middle of the contact, metres, world.
         normal: Unit, from the first body to the second.
         bodies: The two bodies.
-        floor: Whether the world is one of them.
+        floor: Whether the world, or a body that is fixed to it, is one of them.
     """
 
     frame: Int[np.ndarray, " M"]
@@ -130,13 +131,13 @@ class _Found:
             position=np.concatenate(self.position),
             normal=np.concatenate(self.normal),
             bodies=bodies,
-            floor=(bodies == 0).any(axis=1),
+            floor=fixed_bodies(model)[bodies].any(axis=1),
         )
 
 
 def _lift_feet(model: mujoco.MjModel, feet: Int[np.ndarray, " F"]) -> None:
     """Put the floor on a bit of its own that the geoms of the feet do not have."""
-    world = model.geom_bodyid == 0
+    world = fixed_bodies(model)[model.geom_bodyid]
     foot = np.isin(model.geom_bodyid, feet)
     kind, affinity = model.geom_contype, model.geom_conaffinity
     meets = (kind[world][:, None] & affinity) | (kind & affinity[world][:, None])

@@ -35,7 +35,7 @@ class Placement:
 
     Attributes:
         place: Place of the ankle over the floor, m.
-        yaw: Yaw of the toes, rad.
+        yaw: How far the foot is turned from its rest pose along x about the vertical, rad.
     """
 
     place: Float[np.ndarray, "2"]
@@ -71,8 +71,10 @@ def feet_of(points: Float[np.ndarray, "K 3"], heading: float, robot: Robot) -> F
     names = robot.keypoint_names
     found = {}
     for side in SIDES:
-        ankle, toe = names.index(f"{side}_foot"), f"{side}_toe"
-        yaw = yaw_of(points[names.index(toe)] - points[ankle]) if toe in names else heading
+        ankle, toe, yaw = names.index(f"{side}_foot"), f"{side}_toe", heading
+        if toe in names:  # which may point in or out where the foot is not turned
+            own = yaw_of(robot.toe_arms[toe])
+            yaw = yaw_of(points[names.index(toe)] - points[ankle]) - own
         found[side] = Placement(points[ankle, :2], yaw)
     return found
 

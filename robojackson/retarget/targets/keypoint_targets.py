@@ -45,6 +45,7 @@ class Targets:
         dt: Seconds a step.
         cycle_offset: Displacement of one cycle, metres; None when the clip does not repeat.
         airborne: Steps in free fall.
+        danced: Steps of the clip, where stands lead into and out of it; all when None.
     """
 
     keypoints_w: Float[np.ndarray, "N K 3"]
@@ -54,6 +55,7 @@ class Targets:
     dt: float
     cycle_offset: Float[np.ndarray, "3"] | None
     airborne: Bool[np.ndarray, " N"]
+    danced: Bool[np.ndarray, " N"] | None = None
 
     def __len__(self) -> int:
         return len(self.keypoints_w)
@@ -170,8 +172,11 @@ def every_second(clip_targets: Targets) -> Targets:
     return replace(select_steps(clip_targets, slice(None, None, 2)), dt=2 * clip_targets.dt)
 
 
-def select_steps(clip_targets: Targets, steps: slice | Bool[np.ndarray, " N"]) -> Targets:
+def select_steps(
+    clip_targets: Targets, steps: slice | Bool[np.ndarray, " N"] | Int[np.ndarray, " M"]
+) -> Targets:
     """Return some of the steps, or all of them in another order."""
+    danced = clip_targets.danced
     return replace(
         clip_targets,
         keypoints_w=clip_targets.keypoints_w[steps],
@@ -179,6 +184,7 @@ def select_steps(clip_targets: Targets, steps: slice | Bool[np.ndarray, " N"]) -
         contact=clip_targets.contact[steps],
         heading=clip_targets.heading[steps],
         airborne=clip_targets.airborne[steps],
+        danced=None if danced is None else danced[steps],
     )
 
 

@@ -93,9 +93,11 @@ def with_tails(aims: Targets, robot: Robot, config: TailConfig) -> Tailed:
     before = _tail(_reversed(aims), robot, config, config.lead_s)
     after = _tail(aims, robot, config, config.stand_s)
     parts = (_reversed(before), aims, after)
-    first = len(before)
+    first, whole = len(before), _joined(parts)
+    clip, danced = slice(first, first + len(aims)), np.zeros(len(whole), bool)
+    danced[clip] = True
     lead, stand = (round(seconds / aims.dt) for seconds in (config.lead_s, config.stand_s))
-    return Tailed(_joined(parts), slice(first, first + len(aims)), lead, stand)
+    return Tailed(replace(whole, danced=danced), clip, lead, stand)
 
 
 def settled(

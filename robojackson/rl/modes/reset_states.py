@@ -12,6 +12,7 @@ from robojackson.geometry.rotations import heading
 from robojackson.rl.config.train_config import ResetConfig
 from robojackson.rl.sim.reference_clip import STRIDE, Clip
 from robojackson.robot.model import Robot
+from robojackson.robot.own_bodies import own_bodies
 
 BIN_SECONDS, MOST_BINS = 0.25, 250
 FORGET, FORGET_OF_MANY = 0.02, 0.1
@@ -116,7 +117,8 @@ def default_standing_pose(robot: Robot) -> Float[np.ndarray, " nq"]:
     data = mujoco.MjData(model)
     data.qpos[7:] = robot.stand
     mujoco.mj_forward(model, data)
-    solid = (model.geom_bodyid > 0) & ((model.geom_contype > 0) | (model.geom_conaffinity > 0))
+    touches = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+    solid = own_bodies(model)[model.geom_bodyid] & touches
     heights = data.geom_xpos[:, 2]
     lowest = min(heights[i] - _reach_down(model, data, int(i)) for i in np.flatnonzero(solid))
     qpos = data.qpos.copy()

@@ -75,7 +75,7 @@ def gains(
 
 def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " nu"]:
     """Return the radians that a full action moves each motor's target: the robot's action scale,
-    unless the configuration has another for all hinges or for the arms."""
+    unless the configuration has another for all hinges; the arms' may be another still."""
     model = robot.model
     arms = _moved_by(robot, ("left_hand", "right_hand")) - _moved_by(robot, ("head",))
     legs = _moved_by(robot, ("left_foot", "right_foot"))
@@ -84,7 +84,7 @@ def residual_scale(robot: Robot, control: ControlConfig) -> Float[np.ndarray, " 
     scale: np.ndarray = robot.actuation.action_scale[Motors.of(model).hinge]
     scale = scale * (control.action_factor or 1.0)
     if control.residual is not None:
-        scale = np.where(is_arm, scale, control.residual)
+        scale = np.full_like(scale, control.residual)
     if control.arm_residual is not None:
         scale = np.where(is_arm, control.arm_residual, scale)
     return scale

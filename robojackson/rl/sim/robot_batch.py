@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors
+from robojackson.robot.own_bodies import own_mass
 
 SIZE = 8
 """Number of robots in a batch."""
@@ -145,4 +146,5 @@ class Batch:
 
 def centre_of_mass(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:
     """Return the centre of mass of the whole robot, from MuJoCo's last poses, metres, world."""
-    return np.asarray(model.body_mass @ data.xipos / model.body_mass.sum())
+    mass = own_mass(model)
+    return np.asarray(mass @ data.xipos / mass.sum())

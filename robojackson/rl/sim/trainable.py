@@ -34,6 +34,9 @@ def require_trainable(robot: Robot, config: TrainConfig | None = None) -> None:
     elif not np.allclose(low, -high):
         name = model.actuator(int(np.argmax(np.abs(low + high)))).name
         reason = f"the control range of motor {name!r} is not the same in both directions"
+    elif not (both := _both_directions(model)).all():
+        name = model.actuator(int(np.argmin(both))).name
+        reason = f"the force range of motor {name!r} or of its joint allows one direction alone"
     elif not fall.relative and height < fall.height:
         reason = (
             f"it stands with its root {height:.2f} m above the floor, and less than "
@@ -55,6 +58,19 @@ def _damping(robot: Robot, control: ControlConfig) -> tuple[Float[np.ndarray, " 
     set_by_hand = control.stiffness is not None or control.damping is not None
     found = np.bincount(hinges, damping, len(robot.joint_names))
     return found, "track.control.damping" if set_by_hand else ""
+
+
+def _both_directions(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:
+    """Return whether the force ranges of each motor and of its joint have both directions."""
+    joint = model.actuator_trnid[:, 0]
+    own = _around_zero(model.actuator_forcerange) | (model.actuator_forcelimited == 0)
+    bound = _around_zero(model.jnt_actfrcrange) | (model.jnt_actfrclimited == 0)
+    result: np.ndarray = own & bound[joint]
+    return result
+
+
+def _around_zero(ranges: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, " N"]:
+    return np.asarray((ranges[:, 0] < 0) & (ranges[:, 1] > 0))
 
 
 def _torque_motors(model: mujoco.MjModel) -> Bool[np.ndarray, " nu"]:

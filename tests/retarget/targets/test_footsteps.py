@@ -1,6 +1,7 @@
 """Steps from feet on which no robot stands well into the robot's own stand."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,10 @@ from robojackson.retarget.targets.footsteps import (
     SIDES,
     Feet,
     Placement,
+    about_up,
     feet_of,
+    own_stand,
+    place_feet,
     stand_feet,
     stand_over,
     stands_badly,
@@ -20,7 +24,8 @@ from robojackson.retarget.targets.footsteps import (
 )
 from robojackson.retarget.targets.keypoint_targets import targets
 from robojackson.retarget.targets.tails import TailConfig, with_tails
-from robojackson.robot.model import Robot
+from robojackson.robot.model import Robot, load_robot
+from tests.fixtures import machine
 from tests.fixtures.robots import human
 
 HEADING, DT = 0.7, 0.02
@@ -54,6 +59,24 @@ def test_a_foot_that_is_turned_away_is_placed_again(robot: Robot, turn: float) -
     assert walk is not None
     assert walk.in_air.any(0).tolist() == [True, False]
     assert walk.feet["left"].yaw == pytest.approx(HEADING)
+
+
+@pytest.mark.parametrize("out", [0.0, 0.04, -0.04])
+def test_toes_that_point_in_or_out_do_not_turn_the_feet(out: float, tmp_path: Path) -> None:
+    """Each foot was turned by the angle of its own toe where the clip and the stand meet."""
+    described = machine.description(tmp_path)
+    sites = dict(described.sites)
+    for side, sign in (("left", 1), ("right", -1)):
+        body, (x, y, z) = sites[f"{side}_toe"]
+        sites[f"{side}_toe"] = (body, (x, y + sign * out, z))
+    robot = load_robot(replace(described, sites=sites))
+    assert robot.toe_arms["left_toe"][1] == pytest.approx(out)
+    points = own_stand(robot) @ about_up(HEADING).T
+    feet = feet_of(points, HEADING, robot)
+    assert [feet[side].yaw for side in SIDES] == pytest.approx([HEADING, HEADING])
+    placed = points.copy()
+    place_feet(placed, feet, robot)
+    np.testing.assert_allclose(placed, points, atol=1e-9)
 
 
 def test_crossed_feet_are_uncrossed_one_after_the_other(robot: Robot) -> None:

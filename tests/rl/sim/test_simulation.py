@@ -126,6 +126,15 @@ def test_only_the_arms_get_the_small_residual(robot: Robot) -> None:
                     for joint in ("shoulder1", "shoulder2", "elbow")}  # fmt: skip
 
 
+def test_a_residual_is_that_of_all_hinges_and_of_the_arms_too(robot: Robot) -> None:
+    """The arms stayed at the robot's own action scale."""
+    scale = residual_scale(robot, ControlConfig(residual=0.3))
+    np.testing.assert_array_equal(scale, 0.3)
+    own = robot.actuation.action_scale[Motors.of(robot.model).hinge]
+    arms = residual_scale(robot, ControlConfig(arm_residual=0.2))
+    np.testing.assert_array_equal(arms[arms != 0.2], own[arms != 0.2])
+
+
 def test_a_held_torque_is_the_pd_law_at_the_first_substep(
     robot: Robot, sway: ReferenceMotion
 ) -> None:

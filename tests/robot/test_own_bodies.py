@@ -1,0 +1,76 @@
+"""A body that is fixed to the world is no part of the robot."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from robojackson.retarget.feasibility.certification import certify
+from robojackson.retarget.feasibility.contact_wrench import Tolerance
+from robojackson.retarget.feasibility.inverse_dynamics import body_weight
+from robojackson.retarget.solver.collision import Detector
+from robojackson.rl.modes.reset_states import default_standing_pose
+from robojackson.rl.sim.robot_batch import centre_of_mass as simulated_centre
+from robojackson.robot.model import Robot, load_robot
+from robojackson.robot.tree_kinematics import centre_of_mass, point_jacobian, pose, tree
+from tests.fixtures.own_robot import gymnasium_model
+from tests.fixtures.robots import description
+
+STAGE = (
+    '<body name="stage" pos="0 0 -.2"><geom type="box" size="3 3 .2"/>'
+    '<body name="marker" pos="0 0 -1"><geom size=".1" mass="5"/></body></body>'
+)
+
+
+@pytest.fixture
+def on_stage(tmp_path: Path) -> Robot:
+    """Return Humanoid-v5 on a slab of several tonnes whose upper side is the floor."""
+    text = gymnasium_model().read_text()
+    (tmp_path / "model.xml").write_text(text.replace("<worldbody>", f"<worldbody>{STAGE}"))
+    return load_robot(replace(description(), mjcf=str(tmp_path / "model.xml")))
+
+
+def test_the_mass_and_its_centre_are_those_of_mujocos_subtree(on_stage: Robot) -> None:
+    model, data = on_stage.model, mujoco.MjData(on_stage.model)
+    root = model.body("torso").id
+    data.qpos[:] = on_stage.standing
+    data.qpos[0] += 1.0
+    mujoco.mj_forward(model, data)
+    assert model.body_mass.sum() > 1000.0
+    shape = tree(on_stage)
+    found = centre_of_mass(shape, pose(shape, data.qpos[None]))[0]
+    np.testing.assert_allclose(found, data.subtree_com[root], atol=1e-9)
+    np.testing.assert_allclose(simulated_centre(model, data), data.subtree_com[root], atol=1e-9)
+    assert body_weight(on_stage) == pytest.approx(9.81 * model.body_subtreemass[root])
+    assert f"{model.body_subtreemass[root]:.1f} kg" in repr(on_stage)
+
+
+def test_no_hinge_and_no_root_moves_it(on_stage: Robot) -> None:
+    model, shape = on_stage.model, tree(on_stage)
+    bodies = np.array([model.body(name).id for name in ("stage", "marker")])
+    points = np.ones((1, 2, 3))
+    found = point_jacobian(shape, pose(shape, on_stage.standing[None]), points, bodies)
+    np.testing.assert_array_equal(found, 0.0)
+
+
+def test_the_robot_stands_and_leans_as_without_it(robot: Robot, on_stage: Robot) -> None:
+    stand = default_standing_pose(robot)
+    np.testing.assert_allclose(default_standing_pose(on_stage), stand, atol=1e-12)
+    leaning = np.repeat(stand[None], 8, 0)
+    leaning[:, 3], leaning[:, 4] = np.cos(0.175), np.sin(0.175)
+    bare, staged = (
+        certify(each, leaning, 0.015, None, Tolerance()).certificate.slack
+        for each in (robot, on_stage)
+    )
+    assert bare[4] > 1.0, "nothing holds a body that leans beside its feet"
+    np.testing.assert_allclose(staged, bare, rtol=1e-6)
+
+
+def test_what_is_fixed_to_the_world_is_floor(on_stage: Robot) -> None:
+    stand = default_standing_pose(on_stage)[None]
+    touches = Detector(on_stage, 0.01).touches(stand)
+    assert len(touches.floor) >= 4, "each foot touches the plane and the slab"
+    assert touches.floor.all()
+    assert not Detector(on_stage, 0.01, feet=False).touches(stand).floor.any()
