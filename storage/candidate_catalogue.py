@@ -13,13 +13,11 @@ from typing import Any
 
 import pyarrow as pa
 
-from robojackson.clips.quality.stability import STABILITY_SCORE
 from robojackson.errors import StoreError
 from robojackson.files import tables
 from robojackson.files.sql_tables import answering
-from robojackson.files.table_types import F64, I32, TEXT, Column, TableSchema
-from robojackson.pipeline.table_schemas import VIDEO_CANDIDATE
 from storage.artifact import Artifact
+from storage.candidate_record import CANDIDATE_RECORD, TIME
 from storage.store import Store
 
 FOLDER = "candidates"
@@ -27,38 +25,6 @@ COMPACT_FROM = 32
 """Files from which on a compaction is worth its while."""
 ATTEMPTS = 5
 """Readings that may lose a file to a compaction in between."""
-TIME = pa.timestamp("us", tz="UTC")
-
-QUALITY = (
-    Column("detected_share", F64, "1", nullable=True),
-    Column("full_body_share", F64, "1", nullable=True),
-    Column("person_height_px", F64, "px", nullable=True),
-    Column("people", I32, nullable=True),
-    Column("cuts", I32, nullable=True),
-    Column("static_share", F64, "1", nullable=True),
-    Column("moving_share", F64, "1", nullable=True),
-    Column("flat_share", F64, "1", nullable=True),
-)
-CANDIDATE_RECORD = TableSchema(
-    "CandidateRecord",
-    "assessment of a video",
-    (
-        Column("record_id", TEXT),
-        Column("run_id", TEXT),
-        Column("dance", TEXT),
-        Column("source", TEXT),
-        *VIDEO_CANDIDATE.columns,
-        Column("thumbnail", TEXT, nullable=True),
-        *(Column(c.name, c.type, c.unit, nullable=True) for c in STABILITY_SCORE.columns),
-        *QUALITY,
-        # chosen, accepted, rejected (by a filter) or failed (could not be downloaded or read)
-        Column("decision", TEXT),
-        Column("reason", TEXT, nullable=True),
-        Column("decided_at", TIME),
-        Column("video_key", TEXT, nullable=True),
-        Column("video_sha256", TEXT, nullable=True),
-    ),
-)
 Row = Mapping[str, Any]
 
 
@@ -142,6 +108,14 @@ def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Return source and id of every video that could never be assessed for a dance."""
     found = _of(store, dance, kind)
     return {_key_of(row) for row in found} - _assessed(found)
+
+
+def accepted(store: Store, dance: str, kind: str = "") -> list[dict[str, Any]]:
+    """Return the last assessments of the videos that may be danced and were never chosen, whose
+    files exist."""
+    last = {_key_of(row): row for row in _of(store, dance, kind)}
+    fit = [row for row in last.values() if row["decision"] == "accepted" and row["video_key"]]
+    return [row for row in fit if store.exists(row["video_key"])]
 
 
 def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
