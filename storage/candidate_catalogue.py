@@ -7,7 +7,7 @@ files, and a reader counts it once by its `record_id`. DuckDB answers questions.
 """
 
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -16,6 +16,8 @@ import pyarrow as pa
 from robojackson.errors import StoreError
 from robojackson.files import tables
 from robojackson.files.sql_tables import answering
+from robojackson.files.table_door import MOST_NUMBERS, MOST_TEXT
+from robojackson.files.table_types import TEXT
 from storage.artifact import Artifact
 from storage.candidate_record import CANDIDATE_RECORD, TIME
 from storage.store import Store
@@ -32,7 +34,7 @@ def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
     """Add assessments; a `record_id` is made for each. None when there are no rows.
 
     Raises:
-        BadTable: a row lacks a column or has one too many.
+        BadTable: a row lacks a column or has one too many, or their texts are too long.
         StoreError: the store refuses the file; nothing of it is left.
     """
     named = [{**row, "record_id": uuid.uuid4().hex} for row in rows]
@@ -71,17 +73,23 @@ def _ask(
         return [{name: _in_utc(value) for name, value in row.items()} for row in ask(sql, given)]
 
 
-def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
+def compact(store: Store, least: int = COMPACT_FROM) -> list[Artifact]:
     """Write all rows into one file, if there are `least` files or more; any time, beside anything.
 
-    Two compactions at once leave rows in two files, which the next one puts together.
+    Rows that a reader would refuse in one file become several. Two compactions at once leave rows
+    in two files, which the next one puts together.
+
+    Raises:
+        BadTable: what was written cannot be read; every file that was there stays.
     """
     keys = _keys(store)
     if len(keys) < max(least, 2):
-        return None
+        return []
     read = {key: rows for key in keys if (rows := _read(store, key)) is not None}
     unique = {row["record_id"]: row for rows in read.values() for row in rows.to_pylist()}
-    made = _write(store, "compact", list(unique.values()))
+    made = [_write(store, "compact", part) for part in _readable_parts(unique.values())]
+    for artifact in made:
+        _read(store, artifact.key)
     for key in read:
         store.remove(key)
     return made
@@ -152,7 +160,26 @@ def _key_of(row: Row) -> tuple[str, str]:
 def _write(store: Store, kind: str, rows: Sequence[Row]) -> Artifact:
     when = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
     key = f"{FOLDER}/{kind}-{when}-{uuid.uuid4().hex[:12]}.parquet"
-    return store.put(key, tables.encode_rows(CANDIDATE_RECORD, rows))
+    data = tables.encode_rows(CANDIDATE_RECORD, rows)
+    tables.decode_table(CANDIDATE_RECORD, data, store.address(key))  # a bad file harms all others
+    return store.put(key, data)
+
+
+def _readable_parts(rows: Iterable[Row]) -> Iterator[list[Row]]:
+    """Yield the rows in lists of which each is within the limits of a reader."""
+    names = [c.name for c in CANDIDATE_RECORD.columns if c.type == TEXT]
+    most = MOST_NUMBERS // len(CANDIDATE_RECORD.columns)
+    part: list[Row] = []
+    longest = 1
+    for row in rows:
+        size = max(len((row[name] or "").encode()) for name in names)
+        longest = max(longest, size)
+        if part and (len(part) == most or longest * (len(part) + 1) > MOST_TEXT):
+            yield part
+            part, longest = [], max(size, 1)
+        part.append(row)
+    if part:
+        yield part
 
 
 def _keys(store: Store) -> list[str]:
