@@ -37,6 +37,16 @@ def user_cache() -> Path:
     return Path(root) / "robojackson"
 
 
+def cache_of(root: str) -> Path:
+    """Return the folder in the user's cache of a store that is no folder of this machine: what one
+    store has is never taken for another's.
+
+    Raises:
+        RuntimeError: the user has no home.
+    """
+    return user_cache() / sha256_of(root.encode())[:12]
+
+
 class Place(Protocol):
     """Interface of a place that keeps files; keys are relative, `/` between their parts."""
 

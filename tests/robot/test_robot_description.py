@@ -12,6 +12,7 @@ from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.robot.description import description_sha256
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import ContactPoint, Robot, load_robot
+from storage.store import Store
 from tests.fixtures.robots import G1, description
 
 
@@ -66,9 +67,10 @@ def test_added_robots_are_in_the_folder_of_the_store(
 def test_added_robots_of_an_object_store_are_in_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ROBOJACKSON_STORE", "s3://bucket/store")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert robots_folder() == tmp_path / "robojackson" / "robots"
+    monkeypatch.setenv("ROBOJACKSON_STORE", "memory://bucket/store")
+    assert robots_folder() == Store.from_environment().here / "robots"
+    assert robots_folder().is_relative_to(tmp_path / "robojackson")
 
 
 def test_lengths_are_those_of_the_mjcf(robot: Robot):
