@@ -138,6 +138,18 @@ def test_a_content_that_lost_bytes_is_copied_again(
     assert content(target) == FILES
 
 
+def test_a_content_that_is_damaged_is_replaced_by_the_copy_at_hand(
+    local: Store, backups: Backups, target: Store
+) -> None:
+    """Its size is right, so that only its digest shows it."""
+    backed_up(local, backups)
+    for path in saved(backups):
+        path.write_bytes(path.read_bytes()[::-1])
+    backed_up(local, backups)  # of files so young that all are read again
+    restored(target, backups)
+    assert content(target) == FILES
+
+
 def test_a_removed_file_is_in_the_backups_before_and_not_after(
     store: Store, target: Store, backups: Backups
 ) -> None:
