@@ -4,15 +4,17 @@ Reference means: a file of JSON in the store, or the catalogue of videos, names 
 artifact. The folder is named by the digest of its content, so no other text looks like it.
 """
 
+import os
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from robojackson.errors import StoreError
-from robojackson.files.local_folder import TEMPORARY, LocalFolder
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, files_in
 from robojackson.rl.tensorboard_log import LOGS
 from storage import candidate_catalogue, run_catalogue, stage_records
 from storage.leftovers import PROCESS, TASK, is_held
@@ -86,30 +88,43 @@ def root_of(store: Store) -> Path:
 
 def _entries(root: Path) -> Iterator[Path]:
     """Yield the folders of work, artifacts, pages and downloads, and all single files."""
-    for path in sorted(root.iterdir()):
+    for path in _inside(root):
         if not path.is_dir():
             yield path
         elif path.name == WORK:
             yield from _folders_with_files(path)
         elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER, FEEDBACK):
-            yield from (file for file in sorted(path.rglob("*")) if file.is_file())
+            yield from sorted(_files(path))
         elif path.name in (PAGES, LOGS) or _has_artifacts(path):
-            yield from sorted(path.iterdir())
+            yield from _inside(path)
         else:
             yield path
 
 
 def _folders_with_files(folder: Path) -> Iterator[Path]:
     """Yield the topmost folders that hold a file."""
-    for path in sorted(folder.iterdir()):
-        if path.is_file() or any(inner.is_file() for inner in path.iterdir()):
+    for path in _inside(folder):
+        if path.is_file() or any(inner.is_file() for inner in _inside(path)):
             yield path
         else:
             yield from _folders_with_files(path)
 
 
 def _has_artifacts(folder: Path) -> bool:
-    return any(re.fullmatch("[0-9a-f]{16}", path.name) for path in folder.iterdir())
+    return any(re.fullmatch("[0-9a-f]{16}", path.name) for path in _inside(folder))
+
+
+def _inside(folder: Path) -> list[Path]:
+    """Return what is in a folder, in order; nothing where it has gone meanwhile."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        return sorted(folder.iterdir())
+    return []
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the files of a folder that is walked while others work in it; links are not left."""
+    found = (Path(inner, name) for inner, _, names in os.walk(folder) for name in names)
+    return [path for path in found if path.is_file()]
 
 
 def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
@@ -128,7 +143,7 @@ def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
 def _references(store: Store, root: Path) -> Callable[[str], Kind | None]:
     """Return what finds the kind that refers to an artifact: what is kept longest decides."""
     found: dict[Kind, set[str]] = {kind: set() for kind in REFERRING}
-    for path in root.rglob("*.json"):
+    for path in (path for path in files_in(root) if path.suffix == ".json"):
         kind = _kind_of_text(path.relative_to(root))
         if kind in REFERRING:
             found[kind] |= _named_in(path)
@@ -160,11 +175,11 @@ def _named_in(path: Path) -> set[str]:
 
 def _item(root: Path, path: Path, kind: Kind) -> Item | None:
     """Return the size and age of a file or folder; None where it has gone meanwhile."""
-    files = [path] if path.is_file() else [each for each in path.rglob("*") if each.is_file()]
-    try:
-        facts = [each.stat() for each in files if TEMPORARY not in each.name]
-    except FileNotFoundError:
-        return None
+    files = [path] if path.is_file() else _files(path)
+    facts = []
+    for each in (each for each in files if TEMPORARY not in each.name):
+        with suppress(FileNotFoundError):
+            facts.append(each.stat())
     if not facts:
         return None
     if kind == "work" and any(is_held(path / name) for name in LOCKS):

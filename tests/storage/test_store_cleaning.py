@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -195,6 +196,37 @@ def test_a_store_that_is_not_there_is_not_made(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="there is no store"):
         inventory(Store(tmp_path / "none"))
     assert not (tmp_path / "none").exists()
+
+
+def test_a_store_that_another_process_works_on_has_an_inventory(store: Store) -> None:
+    """Its folders of work come and go while they are listed."""
+    stop = threading.Event()
+
+    def work() -> None:
+        while not stop.is_set():
+            with store.scratch() as folder:
+                for name in "abcdef":
+                    (folder / name).mkdir()
+                    (folder / name / "x").write_text("")
+
+    for number in range(30):
+        recorded(store, f"{number}.json", "nothing")
+    worker = threading.Thread(target=work)
+    worker.start()
+    try:
+        for _ in range(30):
+            assert sum(item.kind == "cache" for item in inventory(store)) == 30
+    finally:
+        stop.set()
+        worker.join()
+
+
+def test_what_a_linked_folder_refers_to_is_no_unused_result(store: Store, tmp_path: Path) -> None:
+    made = store.save("train", "policy.safetensors", b"weights")
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk" / "one.json").write_text(f'{{"policy": "{made.key}"}}')
+    (Path(store.root) / "metrics").symlink_to(tmp_path / "disk")
+    assert kind_of(store, made) == "kept"
 
 
 def test_every_kind_is_explained(store: Store) -> None:
