@@ -24,8 +24,8 @@ Kind = Literal["work", "unused", "videos", "cache", "runs", "kept"]
 KINDS: dict[Kind, str] = {
     "work": "unfinished trainings, downloads and scratch files that no process holds",
     "unused": "results that no record, run or table refers to",
-    "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
-    "cache": "records of finished stages, what only they refer to, gains of feedback; made again",
+    "videos": "videos and their assessments that no dance refers to; downloaded again if needed",
+    "cache": "records of other stages, what only they refer to, gains of feedback; made again",
     "runs": "pages, videos and logs of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
 }
@@ -33,6 +33,8 @@ KINDS: dict[Kind, str] = {
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
 FEEDBACK = "feedback"
 """Where `rl.feedback.cached_feedback` keeps gains."""
+OF_VIDEOS = ("download_video", "take_file", "probe_video", "assess_video")
+"""Stages whose records go with the videos."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)
@@ -66,7 +68,7 @@ def inventory(store: Store) -> list[Item]:
     """
     root = root_of(store)
     named = _references(store, root)
-    found = [_item(root, path, _kind_of(path.relative_to(root), named)) for path in _entries(root)]
+    found = [_item(root, path, _kind_of(root, path, named)) for path in _entries(root)]
     return [item for item in found if item is not None]
 
 
@@ -127,10 +129,13 @@ def _files(folder: Path) -> list[Path]:
     return [path for path in found if path.is_file()]
 
 
-def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
+def _kind_of(root: Path, entry: Path, named: Callable[[str], Kind | None]) -> Kind:
+    path = entry.relative_to(root)
     top = path.parts[0]
     if top == WORK:
         return "work"
+    if _kind_of_text(path) == "videos" and top == stage_records.FOLDER:
+        return "videos" if {named(one) for one in _named_in(entry)} == {"videos"} else "cache"
     if top in (stage_records.FOLDER, FEEDBACK):
         return "cache"
     if top in (PAGES, LOGS, run_catalogue.FOLDER):
@@ -161,6 +166,8 @@ def _kind_of_text(path: Path) -> Kind:
     """Return the kind of a file that may name artifacts: one inside an artifact counts as kept."""
     kinds: dict[str, Kind] = {stage_records.FOLDER: "cache", run_catalogue.FOLDER: "runs"}
     kinds |= {PAGES: "runs", WORK: "work", DOWNLOADS: "videos"}
+    if path.parts[0] == stage_records.FOLDER and path.parts[1] in OF_VIDEOS:
+        return "videos"
     return kinds.get(path.parts[0], "kept")
 
 

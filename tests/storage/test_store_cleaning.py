@@ -16,7 +16,8 @@ from storage import stage_records, store_cleaning
 from storage.artifact import Artifact
 from storage.store import Store
 from storage.store_cleaning import USUAL, plan, remove, users_of
-from storage.store_inventory import KINDS, inventory
+from storage.store_inventory import KINDS, OF_VIDEOS, inventory
+from tasks import assess_video, download_video, probe_video
 
 DAY_S = 86_400.0
 ALL = ("work", "unused", "videos", "cache", "runs")
@@ -27,11 +28,11 @@ def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "store").create()
 
 
-def recorded(store: Store, name: str, result: object) -> str:
+def recorded(store: Store, name: str, result: object, stage: str = "recover_motion") -> str:
     """Return a record as Prefect writes it: the result is JSON inside JSON."""
     import json
 
-    key = stage_records.address(f"recover_motion/{name}")
+    key = stage_records.address(f"{stage}/{name}")
     store.put(key, json.dumps({"result": stage_records.encode(result).decode()}).encode())
     return key
 
@@ -134,6 +135,34 @@ def test_a_download_that_only_its_note_names_is_a_video(store: Store) -> None:
     assert kind_of(store, made) == "videos"
     remove(store, plan(store, ["videos"], 0.0))
     assert keys(store) == {"downloads/youtube/abc/best.json"}
+
+
+@pytest.mark.parametrize("stage", OF_VIDEOS)
+def test_a_video_goes_with_the_records_of_its_download_and_assessment(
+    stage: str, store: Store
+) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    store.put("downloads/youtube/abc/best.json", f'{{"key": "{made.key}"}}'.encode())
+    recorded(store, "a.json", {"video": made}, stage)
+    assert remove(store, plan(store, USUAL, 0.0)) == []
+    remove(store, plan(store, ["videos"], 0.0))
+    assert keys(store) == {"downloads/youtube/abc/best.json"}
+
+
+@pytest.mark.parametrize("other", ["records/recover_motion/b.json", "runs/one.json"])
+def test_a_video_that_more_than_its_download_names_stays_with_its_record(
+    other: str, store: Store
+) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    record = recorded(store, "a.json", made, "download_video")
+    store.put(other, f'{{"video": "{made.key}"}}'.encode())
+    assert remove(store, plan(store, ["videos"], 0.0)) == []
+    assert keys(store) == {made.key, record, other}
+
+
+def test_stages_of_videos_are_stages() -> None:
+    found = (download_video.download_video, download_video.take_file, probe_video.probe_video)
+    assert tuple(stage.name for stage in (*found, assess_video.assess_video)) == OF_VIDEOS
 
 
 @pytest.mark.parametrize("lock", ["task.lock", "lock", ".held"])
