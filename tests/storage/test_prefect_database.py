@@ -120,9 +120,9 @@ def test_a_password_that_breaks_its_address_is_one_line_with_what_to_write(
     password: str, tmp_path: Path
 ) -> None:
     with pytest.raises(BackupFailed, match=r"CONNECTION_URL is no address .* / as %2F") as failed:
-        database_of({VARIABLES[0]: f"postgresql+asyncpg://u:{password}@h:5432/db"}, tmp_path)
+        database_of({VARIABLES[0]: f"postgresql+asyncpg://u:{password}@h:5432/db"}, no_home)
     assert "sec" not in str(failed.value)
 
 
 def test_an_empty_variable_names_nothing(tmp_path: Path) -> None:
-    assert database_of({VARIABLES[0]: "", **os.environ}, tmp_path).kind == "sqlite"
+    assert database_of({VARIABLES[0]: "", **os.environ}, lambda: tmp_path).kind == "sqlite"
