@@ -17,6 +17,7 @@ from prefect.logging import get_run_logger
 from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
 from flows.find import (
+    BOOK,
     HUNTERS,
     in_good_quality,
     nothing,
@@ -54,8 +55,6 @@ OF_THE_VIDEO = (UnreadableVideo, VideoTooLong, TrackTooShort, NoPersonFound)
 """Errors of a motion that another video may not have; all others are the machine's."""
 CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
 Facts = dict[str, Any]
-BOOK = "dances"
-"""Where the dances are named: a file of `configs`."""
 
 
 @flow(name="refresh", task_runner=HUNTERS)  # type: ignore[arg-type]
