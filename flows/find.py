@@ -13,7 +13,7 @@ from prefect import flow
 from prefect.logging import get_run_logger
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from configs.dance_book import Dance
+from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
 from flows.runtime.launch import launch
 from flows.search.refresh_notes import KIND
@@ -31,6 +31,8 @@ from storage.leftovers import sweep
 from storage.store import Store
 from tasks.download_video import WebVideo, stored_video
 
+BOOK = "dances"
+"""Where the dances are named: a file of `configs`."""
 HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores())
 """Downloads wait for servers, assessments for their processes: more threads than cores."""
 
@@ -38,7 +40,7 @@ HUNTERS: ThreadPoolTaskRunner[Any] = ThreadPoolTaskRunner(max_workers=2 * cores(
 @flow(name="find", flow_run_name="find-{name}", task_runner=HUNTERS)  # type: ignore[arg-type]
 async def find(
     name: str,
-    dance: dict[str, Any],
+    dance: dict[str, Any] | None = None,
     config: str = "finding",
     overrides: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
@@ -46,13 +48,15 @@ async def find(
 
     Args:
         name: Shown as the name of the run.
-        dance: A `Dance`, as a mapping.
+        dance: A `Dance`, as a mapping; without it that of the name in the book, or the words of the
+            name.
         config: Name or path of the configuration of the search.
         overrides: Values by key path.
     """
     sweep(Store.from_environment(), work=False)
     settings = load(FindConfig, config, overrides)
-    found = search_and_rank(build(Dance, dance, "dance"), settings, run_id("find"))
+    named = load(DanceBook, BOOK).find(name) if dance is None else build(Dance, dance, "dance")
+    found = search_and_rank(named, settings, run_id("find"))
     table = rows(found)
     await publish_search(found.dance.name, table, table[0] if found.chosen else None)
     return summarise(found)

@@ -17,6 +17,7 @@ from prefect.logging import get_run_logger
 from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
 from flows.find import (
+    BOOK,
     HUNTERS,
     in_good_quality,
     nothing,
@@ -27,14 +28,13 @@ from flows.runtime.launch import launch
 from flows.search.refresh_notes import KIND, is_due, note
 from flows.search.search_artifacts import publish_search
 from flows.search.search_entries import REASON_LENGTH, reason_of, rows
-from flows.search.search_pipeline import search_and_rank
+from flows.search.search_pipeline import search_and_rank, steadiest
 from flows.video_pass.motion_stages import to_reference
 from robojackson.cli.options import yaml_text
 from robojackson.clips.web.untrusted_text import clean_text
 from robojackson.errors import (
     BadConfiguration,
     NoPersonFound,
-    RoboJacksonError,
     SearchFailed,
     TrackTooShort,
     UnreadableVideo,
@@ -55,8 +55,6 @@ OF_THE_VIDEO = (UnreadableVideo, VideoTooLong, TrackTooShort, NoPersonFound)
 """Errors of a motion that another video may not have; all others are the machine's."""
 CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
 Facts = dict[str, Any]
-BOOK = "dances"
-"""Where the dances are named: a file of `configs`."""
 
 
 @flow(name="refresh", task_runner=HUNTERS)  # type: ignore[arg-type]
@@ -150,7 +148,7 @@ async def refresh_dance(
     store = Store.from_environment()
     stages = load(PipelineConfig, pipeline, pipeline_overrides)
     mine = (store, entry.name, KIND)  # assessments of `find` do not count here
-    reigning = candidate_catalogue.champion(*mine)
+    reigning = _best_so_far(mine, settings)
     seen, failing = candidate_catalogue.known(*mine), candidate_catalogue.failed(*mine)
     found = search_and_rank(entry, settings, run_id(KIND), seen, reigning, failing)
     listing = rows(found)
@@ -159,21 +157,27 @@ async def refresh_dance(
     if chosen is None:
         raise NoPersonFound(nothing(found))
     video = in_good_quality(found.chosen, settings) if found.chosen else None
+    is_new = found.chosen is not None
     while True:
+        if chosen["decision"] != "chosen":
+            chosen, is_new = {**chosen, **_decided("chosen", "")}, True
+            candidate_catalogue.append(store, [chosen])
         try:
             made = motion(store, video or of_champion(chosen, settings), stages)
             break
         except OF_THE_VIDEO as cause:
-            candidate_catalogue.append(store, [{**chosen, **_failed(cause)}])
-            before = candidate_catalogue.champion(*mine)
-            if before is None:
+            reason = f"no motion could be made of it: {reason_of(cause)}"
+            candidate_catalogue.append(store, [{**chosen, **_decided("failed", reason)}])
+            other = _best_so_far(mine, settings)
+            if other is None:
                 raise
-            get_run_logger().warning("%s: %s; the one before is danced", entry.name, cause)
-            chosen, video = before, None
+            title = clean_text(other["title"] or other["video_id"], REASON_LENGTH)
+            get_run_logger().warning("%s: %s; %s is danced", entry.name, cause, title)
+            chosen, video, is_new = other, None, False
     return {
         "run_id": found.run_id,
         "assessed": len(listing),
-        "is_new": video is not None,
+        "is_new": is_new,
         "chosen": {key: chosen[key] for key in CHOSEN_COLUMNS},
         **made,
     }
@@ -192,10 +196,21 @@ def motion(store: Store, video: Artifact, settings: PipelineConfig) -> Facts:
     }
 
 
-def _failed(cause: RoboJacksonError) -> Facts:
-    """Return the catalogue's entry for a choice of which no motion could be made."""
-    reason = clean_text(f"no motion could be made of it: {reason_of(cause)}", REASON_LENGTH)
-    return {"decision": "failed", "reason": reason, "decided_at": datetime.now(UTC)}
+def _best_so_far(mine: tuple[Store, str, str], settings: FindConfig) -> Mapping[str, Any] | None:
+    """Return the catalogue's row of the present choice, else of the steadiest that may be danced
+    and never was.
+
+    Args:
+        mine: Store, dance, and kind of the runs.
+    """
+    reigning = candidate_catalogue.champion(*mine)
+    return reigning or steadiest(candidate_catalogue.accepted(*mine), settings)
+
+
+def _decided(decision: str, reason: str) -> Facts:
+    """Return what a decision of now changes in a row of the catalogue."""
+    when = datetime.now(UTC)
+    return {"decision": decision, "reason": clean_text(reason, REASON_LENGTH), "decided_at": when}
 
 
 def _require_distinct(book: DanceBook) -> DanceBook:

@@ -134,14 +134,13 @@ class Backups:
         return path.is_file() and path.stat().st_size == content.size
 
     def add(self, path: Path, stamp: str | None = None) -> Content:
-        """Move a file of `temporary` to its place, unless its content is there already."""
+        """Move a file of `temporary` to its place, over one of its digest, which may be damaged."""
         content = Content(sha256_of_file(path), path.stat().st_size, stamp)
         target = self.path(content)
-        if not self.has(content):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("rb") as file:
-                os.fsync(file.fileno())
-            os.replace(path, target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(path, target)
         return content
 
     def require_whole(self, content: Content, what: str) -> None:

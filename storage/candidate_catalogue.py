@@ -7,19 +7,19 @@ files, and a reader counts it once by its `record_id`. DuckDB answers questions.
 """
 
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
 import pyarrow as pa
 
-from robojackson.clips.quality.stability import STABILITY_SCORE
 from robojackson.errors import StoreError
 from robojackson.files import tables
 from robojackson.files.sql_tables import answering
-from robojackson.files.table_types import F64, I32, TEXT, Column, TableSchema
-from robojackson.pipeline.table_schemas import VIDEO_CANDIDATE
+from robojackson.files.table_door import MOST_NUMBERS, MOST_TEXT
+from robojackson.files.table_types import TEXT
 from storage.artifact import Artifact
+from storage.candidate_record import CANDIDATE_RECORD, TIME
 from storage.store import Store
 
 FOLDER = "candidates"
@@ -27,38 +27,6 @@ COMPACT_FROM = 32
 """Files from which on a compaction is worth its while."""
 ATTEMPTS = 5
 """Readings that may lose a file to a compaction in between."""
-TIME = pa.timestamp("us", tz="UTC")
-
-QUALITY = (
-    Column("detected_share", F64, "1", nullable=True),
-    Column("full_body_share", F64, "1", nullable=True),
-    Column("person_height_px", F64, "px", nullable=True),
-    Column("people", I32, nullable=True),
-    Column("cuts", I32, nullable=True),
-    Column("static_share", F64, "1", nullable=True),
-    Column("moving_share", F64, "1", nullable=True),
-    Column("flat_share", F64, "1", nullable=True),
-)
-CANDIDATE_RECORD = TableSchema(
-    "CandidateRecord",
-    "assessment of a video",
-    (
-        Column("record_id", TEXT),
-        Column("run_id", TEXT),
-        Column("dance", TEXT),
-        Column("source", TEXT),
-        *VIDEO_CANDIDATE.columns,
-        Column("thumbnail", TEXT, nullable=True),
-        *(Column(c.name, c.type, c.unit, nullable=True) for c in STABILITY_SCORE.columns),
-        *QUALITY,
-        # chosen, accepted, rejected (by a filter) or failed (could not be downloaded or read)
-        Column("decision", TEXT),
-        Column("reason", TEXT, nullable=True),
-        Column("decided_at", TIME),
-        Column("video_key", TEXT, nullable=True),
-        Column("video_sha256", TEXT, nullable=True),
-    ),
-)
 Row = Mapping[str, Any]
 
 
@@ -66,7 +34,7 @@ def append(store: Store, rows: Iterable[Row]) -> Artifact | None:
     """Add assessments; a `record_id` is made for each. None when there are no rows.
 
     Raises:
-        BadTable: a row lacks a column or has one too many.
+        BadTable: a row lacks a column or has one too many, or their texts are too long.
         StoreError: the store refuses the file; nothing of it is left.
     """
     named = [{**row, "record_id": uuid.uuid4().hex} for row in rows]
@@ -105,17 +73,23 @@ def _ask(
         return [{name: _in_utc(value) for name, value in row.items()} for row in ask(sql, given)]
 
 
-def compact(store: Store, least: int = COMPACT_FROM) -> Artifact | None:
+def compact(store: Store, least: int = COMPACT_FROM) -> list[Artifact]:
     """Write all rows into one file, if there are `least` files or more; any time, beside anything.
 
-    Two compactions at once leave rows in two files, which the next one puts together.
+    Rows that a reader would refuse in one file become several. Two compactions at once leave rows
+    in two files, which the next one puts together.
+
+    Raises:
+        BadTable: what was written cannot be read; every file that was there stays.
     """
     keys = _keys(store)
     if len(keys) < max(least, 2):
-        return None
+        return []
     read = {key: rows for key in keys if (rows := _read(store, key)) is not None}
     unique = {row["record_id"]: row for rows in read.values() for row in rows.to_pylist()}
-    made = _write(store, "compact", list(unique.values()))
+    made = [_write(store, "compact", part) for part in _readable_parts(unique.values())]
+    for artifact in made:
+        _read(store, artifact.key)
     for key in read:
         store.remove(key)
     return made
@@ -142,6 +116,14 @@ def failed(store: Store, dance: str, kind: str = "") -> set[tuple[str, str]]:
     """Return source and id of every video that could never be assessed for a dance."""
     found = _of(store, dance, kind)
     return {_key_of(row) for row in found} - _assessed(found)
+
+
+def accepted(store: Store, dance: str, kind: str = "") -> list[dict[str, Any]]:
+    """Return the last assessments of the videos that may be danced and were never chosen, whose
+    files exist."""
+    last = {_key_of(row): row for row in _of(store, dance, kind)}
+    fit = [row for row in last.values() if row["decision"] == "accepted" and row["video_key"]]
+    return [row for row in fit if store.exists(row["video_key"])]
 
 
 def _of(store: Store, dance: str, kind: str) -> list[dict[str, Any]]:
@@ -178,7 +160,26 @@ def _key_of(row: Row) -> tuple[str, str]:
 def _write(store: Store, kind: str, rows: Sequence[Row]) -> Artifact:
     when = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
     key = f"{FOLDER}/{kind}-{when}-{uuid.uuid4().hex[:12]}.parquet"
-    return store.put(key, tables.encode_rows(CANDIDATE_RECORD, rows))
+    data = tables.encode_rows(CANDIDATE_RECORD, rows)
+    tables.decode_table(CANDIDATE_RECORD, data, store.address(key))  # a bad file harms all others
+    return store.put(key, data)
+
+
+def _readable_parts(rows: Iterable[Row]) -> Iterator[list[Row]]:
+    """Yield the rows in lists of which each is within the limits of a reader."""
+    names = [c.name for c in CANDIDATE_RECORD.columns if c.type == TEXT]
+    most = MOST_NUMBERS // len(CANDIDATE_RECORD.columns)
+    part: list[Row] = []
+    longest = 1
+    for row in rows:
+        size = max(len((row[name] or "").encode()) for name in names)
+        longest = max(longest, size)
+        if part and (len(part) == most or longest * (len(part) + 1) > MOST_TEXT):
+            yield part
+            part, longest = [], max(size, 1)
+        part.append(row)
+    if part:
+        yield part
 
 
 def _keys(store: Store) -> list[str]:

@@ -9,6 +9,7 @@ elsewhere.
 
 import fcntl
 import logging
+import math
 import os
 import shutil
 import time
@@ -28,6 +29,9 @@ TASK, PROCESS = "task.lock", "lock"
 TRAINING, EVALUATION = "train-", "evaluate-"
 YOUNG_S = 60.0
 """A folder may be younger than the lock in it."""
+REMEMBERED_S = 60.0
+_remembered: dict[str, tuple[float, set[str]]] = {}
+"""When this process listed the finished trainings of a store, and which there were."""
 
 
 def sweep(store: Store, parts: bool = True, work: bool = True) -> list[Path]:
@@ -83,12 +87,17 @@ def _work(store: Store) -> Iterator[Path]:
 
 
 def _finished(store: Store) -> set[str]:
-    """Return the digests of the trainings whose cells are in the tables."""
-    tables = [
-        {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
-        for t in study_tables.CELL
-    ]
-    return set.intersection(*tables)
+    """Return the digests of the trainings whose cells are in the tables; for a minute those of the
+    last time, since each cell of a study sweeps twice and the list may be long."""
+    when, found = _remembered.get(store.root, (-math.inf, set[str]()))
+    if time.monotonic() - when >= REMEMBERED_S:
+        tables = [
+            {_digest(key) for key in store.list(f"{study_tables.FOLDER}/{t}")}
+            for t in study_tables.CELL
+        ]
+        found = set.intersection(*tables)
+        _remembered[store.root] = time.monotonic(), found
+    return found
 
 
 def _digest(key: str) -> str:

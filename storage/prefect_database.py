@@ -1,6 +1,6 @@
 """The database of a Prefect server, as a backup dumps and loads it: in PostgreSQL or in SQLite."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal, Protocol
 from urllib.parse import unquote, urlsplit
@@ -47,17 +47,17 @@ class Database(Protocol):
         """Replace what is in the database by a dump, all of it or nothing."""
 
 
-def database_of(environment: Mapping[str, str], home: Path) -> Database:
+def database_of(environment: Mapping[str, str], home: Callable[[], Path]) -> Database:
     """Return the database of a Prefect server with this environment.
 
     Args:
-        home: Prefect's home, which has the database when no variable names one.
+        home: Called for Prefect's home, which has the database when no variable names one.
     Raises:
         BackupFailed: a variable names one that cannot be copied.
     """
     name = next((name for name in VARIABLES if environment.get(name)), None)
     if name is None:
-        return SQLite(home / SQLITE_FILE)
+        return SQLite(home() / SQLITE_FILE)
     url = environment[name]
     scheme = url.partition("://")[0].partition("+")[0]
     if scheme in ("postgresql", "postgres"):

@@ -3,7 +3,6 @@
 Keys are relative to the root. Every failure of a place is one `StoreError` with one line.
 """
 
-import hashlib
 import os
 import shutil
 import tempfile
@@ -13,7 +12,7 @@ from pathlib import Path
 
 from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree, digest_of, in_one_line
-from robojackson.files.local_folder import LocalFolder, Place, user_cache
+from robojackson.files.local_folder import LocalFolder, Place, cache_of
 from robojackson.files.places import place_at
 from robojackson.pipeline.folder_lock import A_MOMENT, locked
 from storage.artifact import Artifact
@@ -107,7 +106,7 @@ class Store(FileTree):
         """The folder of this machine: the root itself on a disk, else a folder in cache."""
         if isinstance(self.place, LocalFolder):
             return self.place.root
-        return user_cache() / hashlib.sha256(self.root.encode()).hexdigest()[:12]
+        return cache_of(self.root)
 
     def require_writable(self, room_mb: int = 0) -> None:
         """Raise the one line of a store that is full or refuses a write, before any work.

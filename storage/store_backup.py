@@ -55,14 +55,14 @@ def back_up(
         BackupFailed: nothing is there, something cannot be read, or the folder is in the store.
     """
     _require_apart(store, backups)
-    if not database.exists() and not entries(store, database):
+    if not database.exists() and not entries(store, database, without=backups.root):
         raise BackupFailed(
             f"nothing to back up: no file in {store.root}, no database at {database.address}"
         )
     with backups.held():
         before = _newest(backups)
         dump = _dumped(database, backups)
-        found = entries(store, database)
+        found = entries(store, database, without=backups.root)
         progress = Progress("copied", len(found))
 
         def one(key: str) -> Content | None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robojackson.errors import StoreError
-from robojackson.files.local_folder import folder_of
+from robojackson.files.local_folder import files_in, folder_of
 from robojackson.pipeline.folder_lock import locked
 from storage.store import DEFAULT_ROOT, VARIABLE, Store
 from storage.store_inventory import ARTIFACT, LOCKS, PAGES, WORK, Item, Kind, inventory, root_of
@@ -84,8 +84,8 @@ def _without_named(store: Store, old: list[Item]) -> list[Item]:
     stay = [
         path
         for folder in ("records", "runs")
-        for path in (root / folder).rglob("*.json")
-        if path.is_file() and path.relative_to(root).as_posix() not in going
+        for path in files_in(root / folder)
+        if path.suffix == ".json" and path.relative_to(root).as_posix() not in going
     ]
     named = {found.decode() for path in stay for found in ARTIFACT.findall(_content(path))}
     results = {item.key for item in old if not item.key.startswith(f"{PAGES}/")} & named

@@ -4,15 +4,17 @@ Reference means: a file of JSON in the store, or the catalogue of videos, names 
 artifact. The folder is named by the digest of its content, so no other text looks like it.
 """
 
+import os
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from robojackson.errors import StoreError
-from robojackson.files.local_folder import TEMPORARY, LocalFolder
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, files_in
 from robojackson.rl.tensorboard_log import LOGS
 from storage import candidate_catalogue, run_catalogue, stage_records
 from storage.leftovers import PROCESS, TASK, is_held
@@ -22,8 +24,8 @@ Kind = Literal["work", "unused", "videos", "cache", "runs", "kept"]
 KINDS: dict[Kind, str] = {
     "work": "unfinished trainings, downloads and scratch files that no process holds",
     "unused": "results that no record, run or table refers to",
-    "videos": "downloaded videos that only their catalogue refers to; downloaded again if needed",
-    "cache": "records of finished stages, what only they refer to, gains of feedback; made again",
+    "videos": "videos and their assessments that no dance refers to; downloaded again if needed",
+    "cache": "records of other stages, what only they refer to, gains of feedback; made again",
     "runs": "pages, videos and logs of finished dances, and what only they refer to",
     "kept": "tables, studies, walkers, robots, Prefect's database, what is in use: never removed",
 }
@@ -31,6 +33,8 @@ KINDS: dict[Kind, str] = {
 WORK, PAGES, DOWNLOADS, WALKERS = "work", "dances", "downloads", "pretrain"
 FEEDBACK = "feedback"
 """Where `rl.feedback.cached_feedback` keeps gains."""
+OF_VIDEOS = ("download_video", "take_file", "probe_video", "assess_video")
+"""Stages whose records go with the videos."""
 REFERRING: tuple[Kind, ...] = ("kept", "runs", "cache", "videos")
 """Kinds that refer to artifacts; the first of them that names one decides of which kind it is."""
 LOCKS = (TASK, PROCESS, HELD)
@@ -64,7 +68,7 @@ def inventory(store: Store) -> list[Item]:
     """
     root = root_of(store)
     named = _references(store, root)
-    found = [_item(root, path, _kind_of(path.relative_to(root), named)) for path in _entries(root)]
+    found = [_item(root, path, _kind_of(root, path, named)) for path in _entries(root)]
     return [item for item in found if item is not None]
 
 
@@ -86,36 +90,52 @@ def root_of(store: Store) -> Path:
 
 def _entries(root: Path) -> Iterator[Path]:
     """Yield the folders of work, artifacts, pages and downloads, and all single files."""
-    for path in sorted(root.iterdir()):
+    for path in _inside(root):
         if not path.is_dir():
             yield path
         elif path.name == WORK:
             yield from _folders_with_files(path)
         elif path.name in (stage_records.FOLDER, run_catalogue.FOLDER, FEEDBACK):
-            yield from (file for file in sorted(path.rglob("*")) if file.is_file())
+            yield from sorted(_files(path))
         elif path.name in (PAGES, LOGS) or _has_artifacts(path):
-            yield from sorted(path.iterdir())
+            yield from _inside(path)
         else:
             yield path
 
 
 def _folders_with_files(folder: Path) -> Iterator[Path]:
     """Yield the topmost folders that hold a file."""
-    for path in sorted(folder.iterdir()):
-        if path.is_file() or any(inner.is_file() for inner in path.iterdir()):
+    for path in _inside(folder):
+        if path.is_file() or any(inner.is_file() for inner in _inside(path)):
             yield path
         else:
             yield from _folders_with_files(path)
 
 
 def _has_artifacts(folder: Path) -> bool:
-    return any(re.fullmatch("[0-9a-f]{16}", path.name) for path in folder.iterdir())
+    return any(re.fullmatch("[0-9a-f]{16}", path.name) for path in _inside(folder))
 
 
-def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
+def _inside(folder: Path) -> list[Path]:
+    """Return what is in a folder, in order; nothing where it has gone meanwhile."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        return sorted(folder.iterdir())
+    return []
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the files of a folder that is walked while others work in it; links are not left."""
+    found = (Path(inner, name) for inner, _, names in os.walk(folder) for name in names)
+    return [path for path in found if path.is_file()]
+
+
+def _kind_of(root: Path, entry: Path, named: Callable[[str], Kind | None]) -> Kind:
+    path = entry.relative_to(root)
     top = path.parts[0]
     if top == WORK:
         return "work"
+    if _kind_of_text(path) == "videos" and top == stage_records.FOLDER:
+        return "videos" if {named(one) for one in _named_in(entry)} == {"videos"} else "cache"
     if top in (stage_records.FOLDER, FEEDBACK):
         return "cache"
     if top in (PAGES, LOGS, run_catalogue.FOLDER):
@@ -128,7 +148,7 @@ def _kind_of(path: Path, named: Callable[[str], Kind | None]) -> Kind:
 def _references(store: Store, root: Path) -> Callable[[str], Kind | None]:
     """Return what finds the kind that refers to an artifact: what is kept longest decides."""
     found: dict[Kind, set[str]] = {kind: set() for kind in REFERRING}
-    for path in root.rglob("*.json"):
+    for path in (path for path in files_in(root) if path.suffix == ".json"):
         kind = _kind_of_text(path.relative_to(root))
         if kind in REFERRING:
             found[kind] |= _named_in(path)
@@ -146,6 +166,8 @@ def _kind_of_text(path: Path) -> Kind:
     """Return the kind of a file that may name artifacts: one inside an artifact counts as kept."""
     kinds: dict[str, Kind] = {stage_records.FOLDER: "cache", run_catalogue.FOLDER: "runs"}
     kinds |= {PAGES: "runs", WORK: "work", DOWNLOADS: "videos"}
+    if path.parts[0] == stage_records.FOLDER and path.parts[1] in OF_VIDEOS:
+        return "videos"
     return kinds.get(path.parts[0], "kept")
 
 
@@ -160,11 +182,11 @@ def _named_in(path: Path) -> set[str]:
 
 def _item(root: Path, path: Path, kind: Kind) -> Item | None:
     """Return the size and age of a file or folder; None where it has gone meanwhile."""
-    files = [path] if path.is_file() else [each for each in path.rglob("*") if each.is_file()]
-    try:
-        facts = [each.stat() for each in files if TEMPORARY not in each.name]
-    except FileNotFoundError:
-        return None
+    files = [path] if path.is_file() else _files(path)
+    facts = []
+    for each in (each for each in files if TEMPORARY not in each.name):
+        with suppress(FileNotFoundError):
+            facts.append(each.stat())
     if not facts:
         return None
     if kind == "work" and any(is_held(path / name) for name in LOCKS):

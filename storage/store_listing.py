@@ -9,7 +9,7 @@ import fsspec
 
 from robojackson.errors import BackupFailed
 from robojackson.files.file_tree import in_one_line
-from robojackson.files.local_folder import TEMPORARY, LocalFolder
+from robojackson.files.local_folder import TEMPORARY, LocalFolder, files_in
 from robojackson.files.places import Remote
 from storage.prefect_database import Database
 from storage.sqlite_database import SQLite
@@ -24,18 +24,19 @@ RECENT_S = 2.0
 
 
 def entries(
-    store: Store, database: Database, may_be_missing: bool = False
+    store: Store, database: Database, may_be_missing: bool = False, without: Path | None = None
 ) -> dict[str, str | None]:
     """Return the files of a store that a backup has, each with its stamp.
 
     Args:
         may_be_missing: A folder or bucket that does not exist counts as empty.
+        without: A folder that is left out, also where the store has a link to it.
     Raises:
         BackupFailed: the store cannot be listed, or a name in it is no UTF-8.
     """
     with in_one_line(f"cannot list {store.root}", BackupFailed):
         try:
-            found = _found(store)
+            found = _found(store, without)
         except FileNotFoundError:
             if not may_be_missing:
                 raise
@@ -51,28 +52,27 @@ def entries(
     return chosen
 
 
-def _found(store: Store) -> dict[str, str | None]:
+def _found(store: Store, without: Path | None) -> dict[str, str | None]:
     if isinstance(store.place, LocalFolder):
-        return _local(store.place.root)
+        return _local(store.place.root, without)
     assert isinstance(store.place, Remote)
     return _remote(store.place.url)
 
 
-def _local(root: Path) -> dict[str, str | None]:
+def _local(root: Path, without: Path | None) -> dict[str, str | None]:
     """Return the files of a folder, with what changes whenever one is written."""
     found: dict[str, str | None] = {}
-    os.stat(root)  # os.walk finds a folder that does not exist empty
-    for folder, _, names in os.walk(root):
-        for path in (Path(folder, name) for name in names if TEMPORARY not in name):
-            try:
-                facts = path.stat()
-            except FileNotFoundError:
-                continue
-            if not path.is_file():
-                continue
-            recent = time.time() - facts.st_ctime < RECENT_S
-            stamp = f"{facts.st_ino}-{facts.st_size}-{facts.st_mtime_ns}-{facts.st_ctime_ns}"
-            found[path.relative_to(root).as_posix()] = None if recent else stamp
+    os.stat(root)  # of a folder that does not exist there are no files
+    for path in files_in(root, without):
+        if TEMPORARY in path.name:
+            continue
+        try:
+            facts = path.stat()
+        except FileNotFoundError:
+            continue
+        recent = time.time() - facts.st_ctime < RECENT_S
+        stamp = f"{facts.st_ino}-{facts.st_size}-{facts.st_mtime_ns}-{facts.st_ctime_ns}"
+        found[path.relative_to(root).as_posix()] = None if recent else stamp
     return found
 
 

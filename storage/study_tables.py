@@ -22,7 +22,7 @@ import pyarrow as pa
 from robojackson.errors import BadTable, StoreError
 from robojackson.files import tables
 from robojackson.files.local_folder import sha256_of
-from robojackson.files.sql_tables import RunQuery, answering
+from robojackson.files.sql_tables import RunQuery, answering, named_in
 from robojackson.files.table_types import TableSchema
 from robojackson.pipeline.table_schemas import BEAT_RECORD, EPISODE_RECORD, EVALUATION_RECORD
 from storage.artifact import Artifact
@@ -35,6 +35,10 @@ TABLES = {**CELL, "beats": BEAT_RECORD}
 DANCES = "dances"
 """Study of the passes of `robojackson dance`."""
 RUNS = f"{FOLDER}/runs"
+Runs = Collection[str] | None
+"""Ids of the runs whose rows count; all of them if absent."""
+ALL = (*TABLES, "runs")
+"""Names of the tables in questions."""
 ALWAYS = ("run_id", "study", "move", "setup", "config")
 """Columns of `runs` that always exist."""
 
@@ -118,27 +122,29 @@ def query(store: Store, sql: str, given: Mapping[str, Any] | None = None) -> lis
     Raises:
         BadTable: the question is not SQL, or names what is not there.
     """
-    with answering("metrics", _tables(store, None, None)) as ask:
+    with answering("metrics", _tables(store, named_in(sql, ALL))) as ask:
         return ask(sql, given)
 
 
 @contextmanager
-def opened(
-    store: Store, study: str | None = None, runs: Collection[str] | None = None
-) -> Iterator[RunQuery]:
+def opened(store: Store, study: str | None = None, runs: Runs = None) -> Iterator[RunQuery]:
     """Yield a query function over all tables, or those of a study or of some of its runs, read once
     for any number of questions.
     """
-    with answering("metrics", _tables(store, study, runs), limited=False) as ask:
+    with answering("metrics", _tables(store, ALL, study, runs), limited=False) as ask:
         yield ask
 
 
-def _tables(store: Store, study: str | None, runs: Collection[str] | None) -> dict[str, pa.Table]:
-    held = {table: read(store, table, study, runs) for table in TABLES}
-    return held | {"runs": _runs(store, study, runs)}
+def _tables(
+    store: Store, named: Collection[str], study: str | None = None, runs: Runs = None
+) -> dict[str, pa.Table]:
+    """Return the tables of the cells, those that are not named without rows."""
+    counted: dict[str, Runs] = {table: runs if table in named else () for table in ALL}
+    held = {table: read(store, table, study, counted[table]) for table in TABLES}
+    return held | {"runs": _runs(store, study, counted["runs"])}
 
 
-def files_of(store: Store, study: str, runs: Collection[str] | None = None) -> list[Artifact]:
+def files_of(store: Store, study: str, runs: Runs = None) -> list[Artifact]:
     """Return all files of a study, or of some runs of it: its tables and where they come from."""
     keys = [key for table in TABLES for key in store.list(f"{FOLDER}/{table}/study={study}")]
     keys = [key for key in keys if runs is None or _run(key) in runs]
@@ -150,19 +156,30 @@ def runs_of(files: Iterable[Artifact]) -> set[str]:
     return {_run(file.key) for file in files if file.key.endswith(".parquet")}
 
 
-def read(
-    store: Store, table: str, study: str | None = None, runs: Collection[str] | None = None
-) -> pa.Table:
+def read(store: Store, table: str, study: str | None = None, runs: Runs = None) -> pa.Table:
     """Return all rows of a table, with the column `study`, or those of one study or of some
-    runs."""
+    runs. A file of joined cells has the rows of those that have no file."""
     schema = TABLES[table]
     prefix = f"{FOLDER}/{table}" + (f"/study={study}" if study else "")
-    parts = [
-        _with_study(tables.decode_table(schema, store.read(key), store.address(key)), key)
-        for key in store.list(prefix)
-        if key.endswith(".parquet") and (runs is None or _run(key) in runs)
-    ]
+    listed = store.list(prefix) if runs is None or len(runs) else []
+    keys = [key for key in listed if key.endswith(".parquet")]
+    parts = []
+    for key in keys:
+        if runs is not None and _run(key) not in runs and not _is_joined(key):
+            continue
+        part = _with_study(tables.decode_table(schema, store.read(key), store.address(key)), key)
+        if _is_joined(key):
+            inside = f"{key.rpartition('/')[0]}/move="
+            cells = {_run(one) for one in keys if one.startswith(inside)}
+            names = part.column("run_id").to_pylist()
+            counted = [name not in cells and (runs is None or name in runs) for name in names]
+            part = part.filter(pa.array(counted, pa.bool_()))
+        parts.append(part)
     return pa.concat_tables([_empty(schema), *parts], promote_options="default")
+
+
+def _is_joined(key: str) -> bool:
+    return "/move=" not in key  # as docs/scaling.md joins the cells of a study
 
 
 def _relabelled(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -193,7 +210,7 @@ def _run(key: str) -> str:
     return key.rpartition("/")[2].removesuffix(".parquet")
 
 
-def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> list[str]:
+def _notes(store: Store, study: str | None, runs: Runs) -> list[str]:
     """Return the keys of the cells' provenance; one of another study may be among them."""
     found = [key for key in store.list(RUNS) if study is None or key.endswith(f"-{study}.json")]
     if runs is None:
@@ -202,7 +219,7 @@ def _notes(store: Store, study: str | None, runs: Collection[str] | None) -> lis
     return [key for key in found if key.rpartition("/")[2] in note_names]
 
 
-def _runs(store: Store, study: str | None, runs: Collection[str] | None) -> pa.Table:
+def _runs(store: Store, study: str | None, runs: Runs) -> pa.Table:
     """Return the provenance, a row a cell: what is not a plain value stands as JSON."""
     rows = []
     for key in _notes(store, study, runs):

@@ -23,10 +23,6 @@ has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }
 version() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])'; }
 
 candidates() {
-    if [ -n "${PYTHON:-}" ]; then
-        echo "$PYTHON"
-        return
-    fi
     for minor in 11 12 13; do
         echo "python3.$minor /usr/bin/python3.$minor"
     done
@@ -36,6 +32,11 @@ candidates() {
 # The interpreter: the first that can make an environment if there is any, else the first of ours.
 find_python() {
     found=
+    if [ -n "${PYTHON:-}" ]; then # a path, which may have spaces
+        is_python "$PYTHON" && found=$PYTHON
+        echo "$found"
+        return
+    fi
     for name in $(candidates); do
         is_python "$name" || continue
         [ -n "$found" ] || found=$name

@@ -94,8 +94,12 @@ def _source() -> tuple["Store", "Database"]:
     from storage.store import Store
 
     store = Store.from_environment()
-    home = os.environ.get("PREFECT_HOME")
-    return store, database_of(os.environ, Path(home) if home else store.here / HOME)
+
+    def home() -> Path:
+        named = os.environ.get("PREFECT_HOME")
+        return Path(named).expanduser() if named else store.here / HOME
+
+    return store, database_of(os.environ, home)
 
 
 def _require_known(database: "Database") -> None:

@@ -1,5 +1,6 @@
 """Prefect artifacts of a search: the table, the pictures, the link to the chosen video."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from prefect.artifacts import (
@@ -14,7 +15,7 @@ from robojackson.pipeline.run_names import slug_of
 
 
 async def publish_search(
-    name: str, rows: list[dict[str, Any]], chosen: dict[str, Any] | None
+    name: str, rows: list[dict[str, Any]], chosen: Mapping[str, Any] | None
 ) -> None:
     """Publish three artifacts under keys that stay the same for a dance, so that they have a
     history."""

@@ -127,15 +127,30 @@ def challenged(
     if reigning is None or not entries or entries[0].decision != "chosen":
         return list(entries)
     first = entries[0]
-    old = Stability(**{f.name: reigning[f.name] for f in fields(Stability)})
-    if old.score_per_second is None:  # assessed before there was such a column
-        seconds = reigning["duration_s"] or reigning["frames"] / USUAL_FPS
-        old = replace(old, score_per_second=old.stability_score / seconds)
     assert first.score
-    if candidate_ranking.order({"old": old, "new": first.score}, settings.filters)[0] == "new":
+    both = {"old": _score_of(reigning), "new": first.score}
+    if candidate_ranking.order(both, settings.filters)[0] == "new":
         return list(entries)
     reason = clean_text(f"{reigning['title'] or reigning['video_id']} is steadier", REASON_LENGTH)
     return [replace(first, decision="accepted", reason=reason), *entries[1:]]
+
+
+def steadiest(
+    assessed: Sequence[Mapping[str, Any]], settings: FindConfig
+) -> Mapping[str, Any] | None:
+    """Return the row of the catalogue that ranks first, None of no rows."""
+    scores = {f"{i}": _score_of(row) for i, row in enumerate(assessed)}
+    order = candidate_ranking.order(scores, settings.filters)
+    return assessed[int(order[0])] if order else None
+
+
+def _score_of(row: Mapping[str, Any]) -> Stability:
+    """Return the score in a row of the catalogue."""
+    score = Stability(**{f.name: row[f.name] for f in fields(Stability)})
+    if score.score_per_second is not None:
+        return score
+    seconds = row["duration_s"] or row["frames"] / USUAL_FPS  # before there was such a column
+    return replace(score, score_per_second=score.stability_score / seconds)
 
 
 def _submitted(

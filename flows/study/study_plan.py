@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from configs.study_config import Move, Study
 from robojackson.errors import UnreadableVideo
+from robojackson.pipeline.configuration_files import SUFFIXES
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.pipeline.yaml_loader import load
@@ -27,7 +29,7 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
     """
     if overrides.get("steps") is not None:
         overrides = {"move_steps": {}, **overrides}  # of all moves
-    study = load(Study, f"studies/{name}" if "." not in name else name, overrides)
+    study = load(Study, f"studies/{name}" if Path(name).suffix not in SUFFIXES else name, overrides)
     robot = describe_robot(study.robot)
     load_robot(robot)
     for move in {*study.moves, *study.move_steps}:

@@ -4,6 +4,7 @@ That may be the name of a dance, the address of a video on the web, or the path 
 Names are searched and their steadiest video is downloaded; an address is downloaded as it is.
 """
 
+import os
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import asdict
@@ -55,7 +56,7 @@ async def videos_of(source: str, search: Search) -> AsyncIterator[tuple[Path, ..
         SearchFailed: no answer from the web, and no earlier search has chosen a video.
         NoPersonFound: no video of the search may be danced; the message has the reasons.
     """
-    source = source.strip()
+    source = _bare(source)
     if web_address(source):
         with _file(*of_address(source, search)) as path:
             yield (path,)
@@ -96,11 +97,16 @@ def name_of(source: str) -> str:
     Args:
         source: Name of a dance, address of a video, or path.
     """
-    source = source.strip()
+    source = _bare(source)
     if web_address(source):
         parts = urlsplit(source)
         return run_name(parts.query or parts.path)
     return run_name(source if is_name(source) else Path(source).absolute().stem)
+
+
+def _bare(source: str) -> str:
+    """Return a SOURCE without spaces around it, unless it is the path of a file that has some."""
+    return source if os.path.exists(source) else source.strip()
 
 
 @contextmanager

@@ -59,7 +59,8 @@ def motion_ingredients(reference: Path, robot: Robot, network: bool) -> list[Ing
 
 def clip_ingredient(reference: Path) -> Ingredient:
     """Return the clip of a motion, or the file that it was imported from, with the licence that a
-    file beside it states: REUSE's `CLIP.license`, or the `.info.json` of a download."""
+    file beside it, or beside the video of which it is a range, states: REUSE's `CLIP.license`, or
+    the `.info.json` of a download."""
     name, note = "the video or recording that is danced", "declare it with --licence clip=LICENCE"
     record = _record_of(reference)
     path = record.get("video") or record.get("imported")
@@ -69,6 +70,8 @@ def clip_ingredient(reference: Path) -> Ingredient:
     kind = f"imported, {record.get('format')}: " if "imported" in record else ""
     digest = str(record.get("sha256", ""))
     licence, where = stated_licence(clip)
+    if not licence and "range_of" in record:
+        licence, where = stated_licence(Path(str(record["range_of"])))
     if licence:
         return Ingredient("clip", clip.name, licence, f"{kind}stated by {where}", digest)
     return Ingredient("clip", clip.name, UNKNOWN, f"{kind}not stated beside it: {note}", digest)

@@ -105,7 +105,7 @@ def mocap(
         if people:
             data, lines = list_people(clip, out, config, overrides, start)
             return CommandResult(data, text=lines)
-        made = stages.mocap(clip, out, config, overrides, hypotheses, second, start)
+        made = stages.mocap(clip, out, config, overrides, hypotheses, second, start, video)
         made = mocap_card.with_verdict(made | draw_mocap(clip, out, config, overrides, film, start))
     return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))
 

@@ -39,11 +39,13 @@ def mocap(
     hypotheses: int = 0,
     second: Path | None = None,
     start_s: float | None = None,
+    whole: Path | None = None,
 ) -> Figures:
     """Write landmarks.parquet and smpl.parquet of a video or two, and smpl_1... of hypotheses.
 
     Args:
         start_s: Where the clip begins in the video that was given: advice is about that.
+        whole: The video that was given, where `video` is a range of it.
     """
     from robojackson.api.hypotheses import hypothesis_files, sample_hypotheses
     from robojackson.api.motions import load_weights
@@ -64,7 +66,7 @@ def mocap(
         for name, other in sample_hypotheses(track, settings, hypotheses):
             motions[name] = other.to_bytes()
         landmarks = track.to_bytes()
-        record = motion_source.source_record(video, landmarks, motions)
+        record = motion_source.source_record(video, landmarks, motions, whole)
         made = {**motions, "landmarks.parquet": landmarks, motion_source.FILE: record}
         for name, content in made.items():
             files.write(name, content)

@@ -9,6 +9,8 @@ import hashlib
 import os
 import secrets
 import shutil
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -35,6 +37,16 @@ def user_cache() -> Path:
     """
     root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(root) / "robojackson"
+
+
+def cache_of(root: str) -> Path:
+    """Return the folder in the user's cache of a store that is no folder of this machine: what one
+    store has is never taken for another's.
+
+    Raises:
+        RuntimeError: the user has no home.
+    """
+    return user_cache() / sha256_of(root.encode())[:12]
 
 
 class Place(Protocol):
@@ -117,12 +129,44 @@ class LocalFolder:
 
     def list(self, prefix: str) -> list[str]:
         """Return the keys of the files under a folder, without temporary files."""
-        found = (p for p in (self.root / prefix).rglob("*") if p.is_file())
-        return [p.relative_to(self.root).as_posix() for p in found if TEMPORARY not in p.name]
+        found = (path for path in files_in(self.root / prefix) if TEMPORARY not in path.name)
+        return [path.relative_to(self.root).as_posix() for path in found]
 
     def address(self, key: str) -> str:
         """Return the path of a file."""
         return str(self.root / key)
+
+
+def files_in(folder: Path, without: Path | None = None) -> Iterator[Path]:
+    """Yield the files under a folder, in linked folders too, but for those that lead back; what
+    goes away meanwhile, or may not be read, is left out.
+
+    Args:
+        without: A folder that is left out wherever it turns up.
+    """
+    yield from _files_in(folder, tuple(_identities(folder, *([without] if without else []))))
+
+
+def _files_in(folder: Path, left_out: tuple[tuple[int, int], ...]) -> Iterator[Path]:
+    try:
+        inner = sorted(folder.iterdir())
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        return
+    for path in inner:
+        if path.is_file():
+            yield path
+        elif path.is_dir():
+            own = tuple(_identities(path))
+            if own and own[0] not in left_out:
+                yield from _files_in(path, (*left_out, *own))
+
+
+def _identities(*folders: Path) -> Iterator[tuple[int, int]]:
+    """Yield what is the same for every path of a folder, of those that there are."""
+    for folder in folders:
+        with suppress(FileNotFoundError):
+            facts = folder.stat()
+            yield facts.st_dev, facts.st_ino
 
 
 def sha256_of(data: bytes) -> str:

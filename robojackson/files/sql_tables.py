@@ -4,7 +4,8 @@ Threads, memory, time and rows of a query are limited. DuckDB's own memory limit
 every string, so the whole process gets a ceiling as well while a query runs.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import Timer
 from typing import TYPE_CHECKING, Any
@@ -51,9 +52,7 @@ def answering(
 
     with duckdb.connect(":memory:", config=LIMITS if limited else {}) as connection:
         for name, rows in known.items():
-            connection.register("given", rows)
-            connection.execute(f"CREATE TABLE {name} AS SELECT * FROM given")
-            connection.unregister("given")
+            connection.register(name, rows)  # a view: a copy would count as memory of the query
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
 
@@ -76,6 +75,13 @@ def answering(
                 raise BadTable(f"{about}: {' '.join(str(cause).split())}"[:2000]) from cause
 
         yield run_query
+
+
+def named_in(sql: str, known: Iterable[str]) -> set[str]:
+    """Return the tables that a question may read: those whose names are in it, or, where a name may
+    be put together (`query_table`), all."""
+    words = set(re.findall(r"\w+", sql.lower()))
+    return set(known) if words & {"query", "query_table"} else words & set(known)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from robojackson.errors import StoreError
 from robojackson.files.file_tree import FileTree, in_one_line
-from robojackson.files.local_folder import folder_of, sha256_of, sha256_of_file, user_cache
+from robojackson.files.local_folder import cache_of, folder_of, sha256_of, sha256_of_file
 
 VARIABLE, DEFAULT = "ROBOJACKSON_STORE", "store"
 LOCK = ".copying"
@@ -21,9 +21,10 @@ LOCK = ".copying"
 
 
 def files_here() -> Path:
-    """Return the folder that keys of added files are relative to: the store, or the cache where the
-    store is no folder."""
-    return folder_of(_address()) or user_cache()
+    """Return the folder that keys of added files are relative to: the store, or its cache where it
+    is no folder."""
+    address = _address()
+    return folder_of(address) or cache_of(address)
 
 
 def is_whole(path: Path, sha256: str | None) -> bool:

@@ -29,8 +29,8 @@ def find(name_or_path: str | Path) -> Path:
             return given
         raise UnknownName(BY_PATH, str(given), "as a path", names())
     for base in folders():
-        path = base / f"{given}.yaml"
-        if path.is_file() and path.resolve().is_relative_to(base.resolve()):
+        path = Path(os.path.normpath(base / f"{given}.yaml"))  # a link may lead out, `..` not
+        if path.is_file() and path.is_relative_to(os.path.normpath(base)):
             return path
     parent, slash, name = str(name_or_path).rpartition("/")  # Path drops an empty name
     folder = Path(parent).name

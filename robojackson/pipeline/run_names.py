@@ -15,11 +15,16 @@ def run_name(text: str) -> str:
     """Return a file's or a person's name as a part of run ids, folders and command lines.
 
     ASCII letters, digits and `_.-`, never empty, at most `NAME_LENGTH` long; accents are dropped,
-    and a name of which nothing is left gets a digest, so that two of them stay two.
+    and a name that loses letters or of which nothing is left gets a digest, so that two of them
+    stay two.
     """
-    ascii_only = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    plain = unicodedata.normalize("NFKD", text)
+    ascii_only = plain.encode("ascii", "ignore").decode()
     name = re.sub(r"[^A-Za-z0-9_.-]+", "-", ascii_only)[:NAME_LENGTH].strip("-._")
-    return name or f"dance-{hashlib.sha256(text.encode(errors='replace')).hexdigest()[:8]}"
+    if name and not any(c.isalnum() and not c.isascii() for c in plain):
+        return name
+    digest = hashlib.sha256(text.encode(errors="replace")).hexdigest()[:8]
+    return f"{name[: NAME_LENGTH - 1 - len(digest)] or 'dance'}-{digest}"
 
 
 def slug_of(name: str) -> str:

@@ -64,7 +64,7 @@ class Task:
             robot.description.name,
             robot.sha256,
             found,
-            description_sha256(robot.description),
+            description_sha256(robot.description, robot.joint_names),
             tuple(robot.description.imu),
         )
 

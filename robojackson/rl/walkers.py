@@ -112,8 +112,8 @@ def walker_key(robot: RobotDescription, mode: str) -> str:
 
 
 def walkers_root() -> Path:
-    """Return the folder whose `pretrain` holds walkers: the store, or the cache if the store is not
-    a folder."""
+    """Return the folder whose `pretrain` holds walkers: the store, or its cache if it is not a
+    folder."""
     return robots_folder().parent
 
 

@@ -5,8 +5,9 @@ Names are bound to a MuJoCo model by `robot.model.load_robot`. Metres, radians, 
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, fields
+from fnmatch import fnmatchcase
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -218,9 +219,32 @@ class RobotDescription:
     file: str = field(default="", compare=False)
 
 
-def description_sha256(description: RobotDescription) -> str:
+def description_sha256(description: RobotDescription, joints: Sequence[str]) -> str:
     """Return the digest of what a robot's YAML says of its physics and its rules, wherever its
-    files lie and came from, and wherever its accelerometer sits."""
+    files lie and came from, and wherever its accelerometer sits.
+
+    The order of patterns is part of it where another one gives hinges other values.
+
+    Args:
+        joints: Names of the robot's hinges.
+    """
     named = {one.name for one in fields(description) if one.compare} - {"source", "imu"}
     said = {name: value for name, value in asdict(description).items() if name in named}
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+    found = {name: _by_order(value, joints) for name, value in said.items()}
+    welded = list(description.fixed_joints.items())  # hinges that the robot goes without
+    if len(set(description.fixed_joints.values())) > 1 and welded != sorted(welded):
+        found["fixed_joints"] = {str(place): one for place, one in enumerate(welded)}
+    order = {name: values for name, values in found.items() if values}
+    facts = {**said, **({"order": order} if order else {})}
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _by_order(values: object, joints: Sequence[str]) -> Mapping[str, object]:
+    """Return the value of each hinge, the last pattern counting; empty where sorted ones agree."""
+    if not isinstance(values, Mapping):
+        return {}
+    own, other = (
+        {joint: values[one] for one in order for joint in joints if fnmatchcase(joint, one)}
+        for order in (values, sorted(values))
+    )
+    return {} if own == other else own

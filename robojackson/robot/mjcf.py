@@ -40,8 +40,8 @@ def site_of(model: mujoco.MjModel, key: str) -> int:
 
 
 def robots_folder() -> Path:
-    """Return where added robots are on this machine: inside the store, or in the cache where the
-    store is no folder."""
+    """Return where added robots are on this machine: inside the store, or in its cache where
+    it is no folder."""
     return files_here() / FOLDER
 
 

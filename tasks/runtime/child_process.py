@@ -61,7 +61,7 @@ def environment() -> dict[str, str]:
 
 async def _forward(process: Process, log_file: Path, last: deque[str]) -> None:
     say: Callable[[str], None] = run_logger().info
-    with log_file.open("a") as file:
+    with log_file.open("a", encoding="utf-8") as file:
         async for line in _lines(process):
             file.write(f"{line}\n")
             file.flush()

@@ -216,7 +216,8 @@ def versions() -> dict[str, str]:
 
 
 def identity(value: Any) -> Any:
-    """Return what a value is, in JSON: artifacts by content, configurations by class and fields.
+    """Return what a value is, in JSON: artifacts by content, configurations by class and fields,
+    mappings in their order, which has a meaning in a robot's patterns and contacts.
 
     Raises:
         TypeError: a value without a content, such as a path.
@@ -227,7 +228,7 @@ def identity(value: Any) -> Any:
         inner = {f.name: identity(getattr(value, f.name)) for f in fields(value) if f.compare}
         return {"class": type(value).__qualname__, **inner}
     if isinstance(value, Mapping):
-        return {str(key): identity(inner) for key, inner in value.items()}
+        return {"pairs": [[str(key), identity(inner)] for key, inner in value.items()]}
     if isinstance(value, list | tuple):
         return [identity(inner) for inner in value]
     if value is None or isinstance(value, str | int | float | bool):

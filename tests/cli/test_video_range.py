@@ -1,9 +1,13 @@
 """A range of a video is looked at alone; an impossible one leaves nothing."""
 
+import shutil
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from flows.cli.commands import app
+from robojackson.api.policy_ingredients import clip_ingredient
 from robojackson.cli.video_range import video_range
 from robojackson.clips.people.tracked_people import Person
 from robojackson.clips.quality.advice import Advice
@@ -50,6 +54,17 @@ def test_what_fails_keeps_the_range_of_an_earlier_run(tmp_path: Path) -> None:
     ):
         raise KeyboardInterrupt
     assert probe(shown, VideoLimits()).duration_s == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.medium
+def test_the_licence_of_a_range_is_that_of_its_video(tmp_path: Path) -> None:
+    clip, out = tmp_path / "walk.mp4", tmp_path / "out"
+    shutil.copy(CLIP, clip)
+    (tmp_path / "walk.mp4.license").write_text("SPDX-License-Identifier: CC-BY-4.0\n")
+    words = ["mocap", str(clip), "-o", str(out), "--config", "smoke", "--start", "1", "--end", "2"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    found = clip_ingredient(out / "reference.parquet")
+    assert (found.name, found.licence) == ("walk-1-2s.mp4", "CC-BY-4.0")
 
 
 def test_two_cameras_have_no_range(tmp_path: Path) -> None:

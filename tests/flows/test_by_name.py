@@ -79,6 +79,22 @@ def test_a_name_becomes_the_best_video(
     assert found == {"hips.mp4": short_clip.read_bytes()}
 
 
+@pytest.mark.parametrize("name", [" take 1.mp4", "my clips ", "my clips /take 1 .mp4"])
+def test_spaces_around_the_path_of_a_file_are_of_its_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, short_clip: Path
+) -> None:
+    (tmp_path / "my clips ").mkdir()
+    for place in (" take 1.mp4", "my clips /take 1 .mp4"):
+        shutil.copy(short_clip, tmp_path / place)
+    monkeypatch.chdir(tmp_path)
+
+    async def found() -> list[bytes]:
+        async with videos_of(name, Search()) as paths:
+            return [path.read_bytes() for path in paths]
+
+    assert asyncio.run(found()) == [short_clip.read_bytes()]
+
+
 @pytest.mark.medium
 def test_a_video_that_was_downloaded_leaves_no_copy(
     records: None, store_folder: Path, tmp_path: Path, short_clip: Path

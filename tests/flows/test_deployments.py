@@ -18,10 +18,11 @@ from prefect.client.orchestration import get_client
 from prefect.client.schemas.actions import WorkPoolCreate
 from prefect.workers.process import ProcessJobConfiguration, ProcessWorker
 
+from configs.dance_book import Dance
 from flows.runtime import deployments
 from flows.runtime.deployments import SILENCE, automations
 from flows.runtime.environment import FIXED
-from robojackson.errors import DeploymentFailed
+from robojackson.errors import DeploymentFailed, SearchFailed
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks.runtime.stage import stage
@@ -77,6 +78,26 @@ def test_dances_can_be_named_from_outside() -> None:
 def test_dances_are_requested_by_name() -> None:
     expected = next(d for d in DEPLOYMENTS if d["entrypoint"] == "flows.dance.dance")
     assert flow_of(expected).validate_parameters({"source": "APT"})["source"] == "APT"
+
+
+@pytest.mark.parametrize(
+    ("name", "query"), [("apt", "APT dance rose bruno mars shorts"), ("Lambada", "Lambada")]
+)
+def test_find_searches_the_dance_of_its_name(
+    name: str, query: str, store_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the book, or by its words."""
+    (deployed,) = (each for each in DEPLOYMENTS if each["entrypoint"] == "flows.find.find")
+    searched: list[Dance] = []
+
+    def far_enough(dance: Dance, *rest: object) -> None:
+        searched.append(dance)
+        raise SearchFailed("far enough")
+
+    monkeypatch.setattr("flows.find.search_and_rank", far_enough)
+    with pytest.raises(SearchFailed, match="far enough"):
+        asyncio.run(flow_of(deployed).fn(**{**deployed["parameters"], "name": name}))
+    assert [dance.full_query for dance in searched] == [query]
 
 
 def test_each_deployment_that_moves_a_robot_takes_its_name() -> None:

@@ -24,6 +24,7 @@ from flows import refresh as nightly
 from flows.refresh import refresh
 from flows.search.requests import check_refresh
 from flows.search.search_entries import Entry, SearchResult, rows
+from robojackson.clips.quality.stability import STABILITY_SCORE
 from robojackson.clips.web.candidate_selection import Selection
 from robojackson.clips.web.video_candidate import VideoCandidate
 from robojackson.errors import (
@@ -240,6 +241,22 @@ class Night:
         candidate_catalogue.append(self.store, rows(made))
         return made
 
+    def search_nothing(self, dance: Dance, *rest: object) -> SearchResult:
+        """Find no new video."""
+        return SearchResult(dance, "refresh-3", (), Selection((), ()))
+
+    def assess(self, name: str, decision: str, score: float) -> None:
+        """Add an assessment of an earlier night to the catalogue."""
+        figures = dict.fromkeys((c.name for c in STABILITY_SCORE.columns), 1)
+        row = {
+            **{"dance": "APT", "source": "site", "url": f"http://host/{name}", "title": name},
+            **{"query": "", "video_id": name, "run_id": "refresh-1", "decision": decision},
+            **{"video_key": self.kept.key, "video_sha256": self.kept.sha256},
+            **{"retrieved_at": datetime.now(UTC), "decided_at": datetime.now(UTC)},
+            **figures, "score_per_second": score,
+        }  # fmt: skip
+        candidate_catalogue.append(self.store, [row])
+
     def motion(self, store: Store, video: Artifact, settings: object) -> dict[str, Any]:
         """Fail for the videos that cannot be danced."""
         if video.key in self.faults:
@@ -272,6 +289,35 @@ def test_a_choice_of_which_no_motion_can_be_made_leaves_the_one_before(
     assert chosen == (danced, danced, danced)
     assert not result["is_new"]
     assert ("site", "new") in candidate_catalogue.known(night.store, "APT")
+
+
+def test_where_every_choice_fails_the_steadiest_fit_video_is_danced_and_stays_the_choice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults: dict[str, Exception] = dict.fromkeys(("new", "old", "oldest"), TrackTooShort("1 frame"))
+    night = Night(Store(tmp_path), monkeypatch, faults)
+    night.assess("shaky", "accepted", 0.9)
+    night.assess("steady", "accepted", 0.2)
+    night.assess("cut", "rejected", 0.1)
+    results = [night.refreshed()]
+    monkeypatch.setattr(nightly, "search_and_rank", night.search_nothing)
+    results.append(night.refreshed())
+    assert [made["chosen"]["video_id"] for made in results] == ["steady", "steady"]
+    assert [made["is_new"] for made in results] == [True, False]
+    assert night.champion == "steady"
+
+
+def test_a_night_that_finds_nothing_dances_what_an_earlier_one_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    faults: dict[str, Exception] = dict.fromkeys(("new", "old", "oldest"), TrackTooShort("1 frame"))
+    night = Night(Store(tmp_path), monkeypatch, faults)
+    with pytest.raises(TrackTooShort):
+        night.refreshed()
+    night.assess("steady", "accepted", 0.2)
+    monkeypatch.setattr(nightly, "search_and_rank", night.search_nothing)
+    assert night.refreshed()["chosen"]["video_id"] == "steady"
+    assert night.champion == "steady"
 
 
 @pytest.mark.parametrize(

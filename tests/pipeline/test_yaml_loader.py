@@ -199,6 +199,18 @@ def test_a_name_does_not_lead_out_of_the_package() -> None:
         configuration_files.find("../tests/configs/given")
 
 
+def test_a_link_to_a_configuration_elsewhere_is_one_of_its_folder(monkeypatch, tmp_path) -> None:
+    (tmp_path / "shared.yaml").write_text("seed: 7\n")
+    for inner in ("configs", "configs/setups"):
+        (tmp_path / inner).mkdir()
+        (tmp_path / inner / "own.yaml").symlink_to(tmp_path / "shared.yaml")
+    monkeypatch.chdir(tmp_path)
+    found = [configuration_files.find(name) for name in ("own", "setups/own")]
+    assert found == [tmp_path / "configs/own.yaml", tmp_path / "configs/setups/own.yaml"]
+    with pytest.raises(UnknownName):
+        configuration_files.find("../shared")
+
+
 def test_names_are_found_from_any_folder(monkeypatch, tmp_path) -> None:
     monkeypatch.chdir(tmp_path)
     assert configuration_files.find("robots/humanoid").is_file()

@@ -99,7 +99,8 @@ def test_a_robot_that_one_machine_adds_loads_on_the_next(
     on("second")
     assert load_robot(robot).joint_names[0] == "left_hip_pitch"
     folder = added_folder(robot)
-    assert folder == tmp_path / "second" / "robojackson" / "robots" / "machine"
+    assert folder == store.here / "robots" / "machine"
+    assert folder.is_relative_to(tmp_path / "second" / "robojackson")
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert found == {*FILES, "licences/LICENSE"}
 

@@ -12,7 +12,8 @@ from robojackson.errors import BadConfiguration, UnknownName
 from robojackson.robot.description import description_sha256
 from robojackson.robot.mjcf import robots_folder
 from robojackson.robot.model import ContactPoint, Robot, load_robot
-from tests.fixtures.robots import description
+from storage.store import Store
+from tests.fixtures.robots import G1, description
 
 
 def test_an_unknown_body_lists_the_known_ones():
@@ -66,9 +67,10 @@ def test_added_robots_are_in_the_folder_of_the_store(
 def test_added_robots_of_an_object_store_are_in_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ROBOJACKSON_STORE", "s3://bucket/store")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert robots_folder() == tmp_path / "robojackson" / "robots"
+    monkeypatch.setenv("ROBOJACKSON_STORE", "memory://bucket/store")
+    assert robots_folder() == Store.from_environment().here / "robots"
+    assert robots_folder().is_relative_to(tmp_path / "robojackson")
 
 
 def test_lengths_are_those_of_the_mjcf(robot: Robot):
@@ -102,6 +104,33 @@ def test_the_sites_leave_the_stock_dynamics_as_they_are(robot: Robot, rng: np.ra
 
 def test_the_place_of_the_accelerometer_ends_no_training_and_the_gains_do() -> None:
     own = description("humanoid")
-    assert description_sha256(replace(own, imu=(0.1, 0.0, 0.0))) == description_sha256(own)
-    other = replace(own, robust_action_factor=2.0)
-    assert description_sha256(other) != description_sha256(own)
+    joints = load_robot(own).joint_names
+    before = description_sha256(own, joints)
+    assert description_sha256(replace(own, imu=(0.1, 0.0, 0.0)), joints) == before
+    assert description_sha256(replace(own, robust_action_factor=2.0), joints) != before
+
+
+def test_the_order_of_patterns_is_in_the_digest_where_it_has_a_meaning(robot: Robot) -> None:
+    def digest(*limits: tuple[str, float]) -> str:
+        own = replace(robot.description, torque_limits=dict(limits))
+        return description_sha256(own, robot.joint_names)
+
+    every, knees, elbows = ("*", 50.0), ("*_knee", 200.0), ("*_elbow", 9.0)
+    assert digest(every, knees) != digest(knees, every)
+    assert digest(every, knees, elbows) == digest(every, elbows, knees)
+
+
+@pytest.mark.parametrize(
+    ("name", "begins"),
+    [
+        ("humanoid", "7d183a5dea39"),
+        ("humanoid_strong", "500ccdd60e63"),
+        pytest.param("g1", "70f9146a0708", marks=G1),
+    ],
+)
+def test_bundled_robots_have_the_digest_of_their_earlier_checkpoints(
+    name: str, begins: str
+) -> None:
+    """Change it only with the robot: checkpoints and walkers of before are refused."""
+    found = load_robot(description(name))
+    assert description_sha256(found.description, found.joint_names).startswith(begins)

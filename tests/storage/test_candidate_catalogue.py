@@ -88,9 +88,26 @@ def test_compaction_keeps_every_row_in_one_file(store: Store) -> None:
     assert candidate_catalogue.records(store) == before
 
 
+def test_a_compaction_makes_no_file_that_its_reader_refuses(tmp_path: Path) -> None:
+    """One long address counts for every row of its file."""
+    store, most = Store(tmp_path), 17_000
+    candidate_catalogue.append(store, [row("long", url=f"https://host/{'x' * 15_800}")])
+    candidate_catalogue.append(store, [row(f"v{number}") for number in range(most)])
+    assert len(candidate_catalogue.compact(store, least=2)) == 2
+    sql = "SELECT count(*) AS n FROM candidates"
+    assert candidate_catalogue.query(store, sql) == [{"n": most + 1}]
+
+
+def test_what_a_reader_would_refuse_is_not_written(store: Store) -> None:
+    long = row("long", url=f"https://host/{'x' * 2**18}")
+    with pytest.raises(BadTable, match="too much text"):
+        candidate_catalogue.append(store, [long, *(row(f"v{number}") for number in range(1_024))])
+    assert store.list("candidates") == []
+
+
 def test_few_files_are_left_alone(store: Store) -> None:
     candidate_catalogue.append(store, [row()])
-    assert candidate_catalogue.compact(store) is None
+    assert candidate_catalogue.compact(store) == []
 
 
 def test_a_compaction_that_dies_before_it_tidies_up_doubles_no_row(
@@ -267,5 +284,5 @@ def test_a_file_of_an_earlier_version_is_read_with_what_it_lacks_empty(tmp_path:
     candidate_catalogue.append(store, [row("new", score_per_second=1.5)])
     found = {r["video_id"]: r["score_per_second"] for r in candidate_catalogue.records(store)}
     assert sorted(found.values(), key=str) == [1.5, None]
-    assert candidate_catalogue.compact(store, 2) is not None
+    assert candidate_catalogue.compact(store, 2)
     assert len(candidate_catalogue.records(store)) == 2

@@ -11,6 +11,7 @@ import pytest
 
 from robojackson.files import local_folder
 from robojackson.pipeline.folder_lock import locked
+from storage import leftovers
 from storage.leftovers import sweep
 from storage.store import Store
 from storage.study_tables import CELL, Place
@@ -79,6 +80,18 @@ def test_a_evaluation_without_a_process_is_removed(store: Store) -> None:
     folder = work(store, "evaluate-1")
     assert sweep(store) == [folder]
     assert not folder.exists()
+
+
+def test_the_finished_trainings_are_listed_once_a_minute(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each cell sweeps twice, and the tables of all studies may be many."""
+    folder = work(store, f"train-{RUN[-12:]}")
+    assert sweep(store) == []
+    finish(store)
+    assert sweep(store) == []
+    monkeypatch.setattr(leftovers, "REMEMBERED_S", 0.0)
+    assert sweep(store) == [folder]
 
 
 @pytest.mark.parametrize("lock", ["task.lock", "lock"])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from robojackson.pipeline.run_names import NAME_LENGTH, run_name
+from robojackson.pipeline.run_names import NAME_LENGTH, run_name, slug_of
 from storage import run_catalogue
 from storage.run_catalogue import Run
 from storage.store import Store
@@ -16,6 +16,8 @@ ODD = [
     'it\'s "it"',
     "ダンス",
     "café",
+    "춤 1",
+    "로" * 70 + "x" * 70,
     "-rm",
     "x" * 300,
     "...",
@@ -44,5 +46,17 @@ def test_a_plain_name_stays_as_it_is() -> None:
     assert run_name("hip_shake.v2-final") == "hip_shake.v2-final"
 
 
-def test_two_names_without_a_latin_letter_stay_two() -> None:
-    assert run_name("ダンス") != run_name("舞踊")
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("ダンス", "舞踊"), ("춤 1", "舞 1"), ("APT 로제", "APT 제니"), ("x" * 300 + "ダ", "x" * 300)],
+)
+def test_two_names_that_lose_letters_stay_two(one: str, other: str) -> None:
+    assert run_name(one) != run_name(other)
+    assert slug_of(one) != slug_of(other)
+
+
+@pytest.mark.parametrize(
+    ("name", "made"), [("café", "cafe"), ("APT – live! 🔥", "APT-live"), ("Ａ１", "A1")]
+)
+def test_a_name_that_loses_no_letter_has_no_digest(name: str, made: str) -> None:
+    assert run_name(name) == made

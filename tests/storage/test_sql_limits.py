@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
 import pytest
 
 from robojackson.errors import BadTable
@@ -25,6 +27,17 @@ from storage.store import Store
 def test_a_question_has_limits(sql: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(BadTable, match=message):
         study_tables.query(Store(tmp_path), sql)
+
+
+def test_tables_may_be_larger_than_the_memory_of_a_question(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sql_tables.LIMITS, "memory_limit", "16MB")
+    rows = pa.table({"survived_s": np.ones(4_000_000)})
+    with sql_tables.answering("metrics", {"episodes": rows}) as ask:
+        assert ask("SELECT sum(survived_s) AS n FROM episodes") == [{"n": 4e6}]
+        with pytest.raises(BadTable, match="takes too much memory; reduce the query"):
+            ask("SELECT list(survived_s) AS n FROM episodes")
 
 
 def test_a_question_without_end_is_interrupted(

@@ -138,6 +138,18 @@ def test_a_content_that_lost_bytes_is_copied_again(
     assert content(target) == FILES
 
 
+def test_a_content_that_is_damaged_is_replaced_by_the_copy_at_hand(
+    local: Store, backups: Backups, target: Store
+) -> None:
+    """Its size is right, so that only its digest shows it."""
+    backed_up(local, backups)
+    for path in saved(backups):
+        path.write_bytes(path.read_bytes()[::-1])
+    backed_up(local, backups)  # of files so young that all are read again
+    restored(target, backups)
+    assert content(target) == FILES
+
+
 def test_a_removed_file_is_in_the_backups_before_and_not_after(
     store: Store, target: Store, backups: Backups
 ) -> None:
@@ -159,6 +171,32 @@ def test_what_belongs_to_processes_of_one_machine_is_left_out(
     elsewhere = SQLite(backups.root.parent / "home" / "prefect.db")
     back_up(local, elsewhere, backups, 7, lambda progress: None)
     assert set(backups.read().files) == set(FILES)
+
+
+def test_linked_folders_of_a_store_are_backed_up_as_others(
+    local: Store, backups: Backups, target: Store, tmp_path: Path
+) -> None:
+    disk, root = tmp_path / "disk", Path(local.root)
+    (disk / "0c").mkdir(parents=True)
+    (disk / "0c" / "clip.mp4").write_bytes(b"frames")
+    (root / "video").symlink_to(disk)
+    backed_up(local, backups)
+    restored(target, backups)
+    assert content(target) == {**FILES, "video/0c/clip.mp4": b"frames"}
+
+
+def test_links_that_lead_back_or_to_the_backups_end_no_backup(
+    local: Store, backups: Backups, tmp_path: Path
+) -> None:
+    disk, root = tmp_path / "disk", Path(local.root)
+    disk.mkdir()
+    (root / "self").symlink_to(root)
+    (root / "disk").symlink_to(disk)
+    (disk / "back").symlink_to(root)
+    (root / "backups").symlink_to(backups.root)
+    (root / "gone").symlink_to(tmp_path / "nowhere")
+    for _ in range(2):
+        assert backed_up(local, backups).files == len(FILES)
 
 
 def test_a_database_in_the_store_is_dumped_and_not_copied(local: Store, backups: Backups) -> None:

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from storage import stage_records, store_cleaning
 from storage.artifact import Artifact
 from storage.store import Store
 from storage.store_cleaning import USUAL, plan, remove, users_of
-from storage.store_inventory import KINDS, inventory
+from storage.store_inventory import KINDS, OF_VIDEOS, inventory
+from tasks import assess_video, download_video, probe_video
 
 DAY_S = 86_400.0
 ALL = ("work", "unused", "videos", "cache", "runs")
@@ -26,11 +28,11 @@ def store(tmp_path: Path) -> Store:
     return Store(tmp_path / "store").create()
 
 
-def recorded(store: Store, name: str, result: object) -> str:
+def recorded(store: Store, name: str, result: object, stage: str = "recover_motion") -> str:
     """Return a record as Prefect writes it: the result is JSON inside JSON."""
     import json
 
-    key = stage_records.address(f"recover_motion/{name}")
+    key = stage_records.address(f"{stage}/{name}")
     store.put(key, json.dumps({"result": stage_records.encode(result).decode()}).encode())
     return key
 
@@ -135,6 +137,34 @@ def test_a_download_that_only_its_note_names_is_a_video(store: Store) -> None:
     assert keys(store) == {"downloads/youtube/abc/best.json"}
 
 
+@pytest.mark.parametrize("stage", OF_VIDEOS)
+def test_a_video_goes_with_the_records_of_its_download_and_assessment(
+    stage: str, store: Store
+) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    store.put("downloads/youtube/abc/best.json", f'{{"key": "{made.key}"}}'.encode())
+    recorded(store, "a.json", {"video": made}, stage)
+    assert remove(store, plan(store, USUAL, 0.0)) == []
+    remove(store, plan(store, ["videos"], 0.0))
+    assert keys(store) == {"downloads/youtube/abc/best.json"}
+
+
+@pytest.mark.parametrize("other", ["records/recover_motion/b.json", "runs/one.json"])
+def test_a_video_that_more_than_its_download_names_stays_with_its_record(
+    other: str, store: Store
+) -> None:
+    made = store.save("video", "clip.mp4", b"frames")
+    record = recorded(store, "a.json", made, "download_video")
+    store.put(other, f'{{"video": "{made.key}"}}'.encode())
+    assert remove(store, plan(store, ["videos"], 0.0)) == []
+    assert keys(store) == {made.key, record, other}
+
+
+def test_stages_of_videos_are_stages() -> None:
+    found = (download_video.download_video, download_video.take_file, probe_video.probe_video)
+    assert tuple(stage.name for stage in (*found, assess_video.assess_video)) == OF_VIDEOS
+
+
 @pytest.mark.parametrize("lock", ["task.lock", "lock", ".held"])
 def test_work_that_a_process_holds_stays(lock: str, store: Store) -> None:
     folder = store.work("train-1")
@@ -195,6 +225,37 @@ def test_a_store_that_is_not_there_is_not_made(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="there is no store"):
         inventory(Store(tmp_path / "none"))
     assert not (tmp_path / "none").exists()
+
+
+def test_a_store_that_another_process_works_on_has_an_inventory(store: Store) -> None:
+    """Its folders of work come and go while they are listed."""
+    stop = threading.Event()
+
+    def work() -> None:
+        while not stop.is_set():
+            with store.scratch() as folder:
+                for name in "abcdef":
+                    (folder / name).mkdir()
+                    (folder / name / "x").write_text("")
+
+    for number in range(30):
+        recorded(store, f"{number}.json", "nothing")
+    worker = threading.Thread(target=work)
+    worker.start()
+    try:
+        for _ in range(30):
+            assert sum(item.kind == "cache" for item in inventory(store)) == 30
+    finally:
+        stop.set()
+        worker.join()
+
+
+def test_what_a_linked_folder_refers_to_is_no_unused_result(store: Store, tmp_path: Path) -> None:
+    made = store.save("train", "policy.safetensors", b"weights")
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk" / "one.json").write_text(f'{{"policy": "{made.key}"}}')
+    (Path(store.root) / "metrics").symlink_to(tmp_path / "disk")
+    assert kind_of(store, made) == "kept"
 
 
 def test_every_kind_is_explained(store: Store) -> None:

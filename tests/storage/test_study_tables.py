@@ -1,5 +1,7 @@
 """The tables of the studies: one file a cell, the same bytes each time, questions in SQL."""
 
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -141,6 +143,42 @@ def test_beats_of_a_dance_are_a_table_of_their_own(store: Store) -> None:
         "run_id": "r1", "motion": "robot", "precision": 0.5, "f1": 2 / 3,
     }  # fmt: skip
     assert [row["study"] for row in study_tables.query(store, OVERVIEW)] == ["smoke"]
+
+
+@pytest.mark.parametrize(
+    ("sql", "expected"),
+    [
+        ("SELECT count(*) AS n FROM Episodes", 1),
+        ("SELECT count(*) AS n FROM query_table('epi' || 'sodes')", 1),
+        ("SELECT count(*) AS n FROM information_schema.tables", 4),
+    ],
+)
+def test_a_question_reads_the_tables_that_it_names(sql: str, expected: int, store: Store) -> None:
+    study_tables.write(store, cell(), made(store))
+    store.put(cell(run_id="damaged").key("evaluations"), b"no table")
+    if "query_table" in sql:
+        store.remove(cell(run_id="damaged").key("evaluations"))
+    assert study_tables.query(store, sql) == [{"n": expected}]
+
+
+def test_the_joined_file_of_a_finished_study_is_read_as_its_cells(
+    store: Store, tmp_path: Path
+) -> None:
+    """As docs/scaling.md joins them; a cell that is published again counts once."""
+    for seed in range(3):
+        study_tables.write(store, cell(seed, f"r{seed}"), made(store, seed))
+    page = (Path(__file__).parents[2] / "docs" / "scaling.md").read_text()
+    script = page.split("```python\n")[1].split("```")[0]
+    subprocess.run(
+        [sys.executable, "-c", script, tmp_path / "metrics" / "evaluations" / "study=smoke"],
+        check=True,
+    )
+    assert len(store.list("metrics/evaluations")) == 1
+    for expected in (3.0, 3.0):
+        sql = "SELECT sum(survived_s) AS s FROM evaluations"
+        assert study_tables.query(store, sql) == [{"s": expected}]
+        assert study_tables.read(store, "evaluations", "smoke", {"r1"}).num_rows == 1
+        study_tables.write(store, cell(1, "r1"), made(store, 1))
 
 
 def test_an_empty_store_answers_with_no_rows(store: Store) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -65,6 +66,23 @@ def test_a_process_that_fails_is_reported_with_its_last_line(tmp_path: Path) -> 
 def test_what_the_process_says_is_in_its_log(tmp_path: Path) -> None:
     run("import sys; print('10 steps', file=sys.stderr)", tmp_path)
     assert (tmp_path / child_process.LOG).read_text() == "10 steps\n"
+
+
+def test_words_of_any_language_are_in_the_log_whatever_the_locale(tmp_path: Path) -> None:
+    say = f"import sys; sys.stderr.buffer.write(bytes.fromhex({'춤'.encode().hex()!r}))"
+    code = (
+        "import asyncio, sys; from pathlib import Path; from tasks.runtime import child_process; "
+        f"command = [sys.executable, '-c', {say!r}]; "
+        "asyncio.run(child_process.run_process(command, 'run', Path(sys.argv[1])))"
+    )
+    plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    folders = os.pathsep.join(filter(None, sys.path))
+    subprocess.run(
+        [sys.executable, "-c", code, tmp_path],
+        env={**os.environ, **plain, "PYTHONPATH": folders},
+        check=True,
+    )
+    assert (tmp_path / child_process.LOG).read_text(encoding="utf-8") == "춤\n"
 
 
 @pytest.mark.parametrize("letters", [1_000, 70_000, 300_000])

@@ -38,6 +38,27 @@ def test_a_full_disk_is_refused_in_one_line_before_any_work(tmp_path: Path, free
     assert not (project / ".venv").exists()
 
 
+def test_the_path_of_an_interpreter_may_have_spaces(tmp_path: Path) -> None:
+    """It can make no environment, which shows that it is the one that was looked at."""
+    python = tmp_path / "my python" / "python3"
+    python.parent.mkdir()
+    python.write_text(
+        f'#!/bin/sh\ncase "$2" in *ensurepip*) exit 1 ;; esac\nexec {sys.executable} "$@"\n'
+    )
+    python.chmod(0o755)
+    done = subprocess.run(
+        ["sh", "tools/bootstrap.sh", "missing"],
+        cwd=ROOT,
+        env={**os.environ, "PYTHON": str(python)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    version = "{}.{}".format(*sys.version_info)
+    assert f"python{version}-venv" in done.stdout.split()
+
+
 @pytest.mark.parametrize(("index", "named"), [("", True), ("https://host/cpu", False)])
 def test_the_size_of_torch_is_named_before_it_is_installed(
     tmp_path: Path, index: str, named: bool

@@ -18,7 +18,7 @@ from robojackson.pipeline.table_schemas import (
     EVALUATION_RECORD,
     VIDEO_CANDIDATE,
 )
-from storage.candidate_catalogue import CANDIDATE_RECORD
+from storage.candidate_record import CANDIDATE_RECORD
 from tools.assets.generated_page import write_or_check
 
 PAGE = Path(__file__).parents[2] / "docs" / "data_contracts.md"

@@ -20,6 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robojackson.files.local_folder import folder_of
+from robojackson.files.processor_cores import cores
 
 PATIENCE_S = 2.0
 """Longest wait for a server or a program, seconds."""
@@ -41,7 +42,7 @@ def issue_report(examined: Mapping[str, Any]) -> list[str]:
         "Python": f"{examined['python']} ({platform.python_implementation()})",
         "platform": f"{platform.system()} {platform.machine()}, {_distribution()}, "
         f"kernel {platform.release()}",
-        "CPU": f"{cpu_model()}, {_cores()} cores usable",
+        "CPU": f"{cpu_model()}, {cores()} cores usable",
         "memory": _memory(),
         "OpenGL": renderer(),
         "ffmpeg": ffmpeg_version(),
@@ -135,12 +136,6 @@ def _distribution() -> str:
         return platform.freedesktop_os_release().get("PRETTY_NAME", "unknown distribution")
     except OSError:
         return platform.version()
-
-
-def _cores() -> int:
-    if sys.platform == "linux":
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _memory() -> str:

@@ -161,7 +161,7 @@ def _reference(kind: str, out: Path, robot: "Robot") -> Path:
         with results_in(out) as files:
             files.write(STANDING, tables.encode(make_standing_motion(robot)))
         return out / STANDING
-    made_for = description_sha256(robot.description) + robot.sha256
+    made_for = description_sha256(robot.description, robot.joint_names) + robot.sha256
     digest = hashlib.sha256(made_for.encode()).hexdigest()[:DIGITS]
     folder = out / f"{Path(WALK).stem}-{digest}"  # apart from the user's files in `out`
     made = folder / "reference.parquet"

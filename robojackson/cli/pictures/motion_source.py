@@ -27,10 +27,13 @@ class MotionSource:
     track: LandmarkTrack
 
 
-def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -> bytes:
+def source_record(
+    video: Path, landmarks: bytes, motions: Mapping[str, bytes], whole: Path | None = None
+) -> bytes:
     """Return the content of source.json.
 
     Args:
+        whole: The video of which `video` is a range, if it is: its licence is beside it.
         landmarks: Content of landmarks.parquet.
         motions: Content of the motions' files by name.
     """
@@ -40,6 +43,8 @@ def source_record(video: Path, landmarks: bytes, motions: Mapping[str, bytes]) -
         "landmarks": hashlib.sha256(landmarks).hexdigest(),
         "motions": {name: hashlib.sha256(data).hexdigest() for name, data in motions.items()},
     }
+    if whole is not None and whole.absolute() != video.absolute():
+        facts["range_of"] = str(whole.absolute())
     return json.dumps(facts, indent=1).encode()
 
 

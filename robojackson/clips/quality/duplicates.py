@@ -17,6 +17,9 @@ from robojackson.motion.landmark_track import LandmarkTrack
 
 DELAY_COST = 0.01
 """Body heights a second of delay: a cyclic dance is its own mirror half a cycle later."""
+ROUGH_POSES, ROUGH_LEAST, ROUGH_FACTOR = 10, 5, 3.0
+"""Of one clip a pose a second, at least so many, is compared first; fewer that both show decide
+nothing; clips more limits apart are no copies."""
 Poses = Float[np.ndarray, "N 33 2"]
 
 
@@ -50,8 +53,12 @@ def find_duplicates(
     kept: dict[str, Poses] = {}
     for name, track in tracks.items():
         mine = poses(track, config.rate)
+        turned_mine = mirrored(mine)
         for other, theirs in kept.items():
-            same, turned = distance(mine, theirs, config), distance(mirrored(mine), theirs, config)
+            same, turned = (
+                distance(one, theirs, config) if _may_be_copies(one, theirs, config) else np.inf
+                for one in (mine, turned_mine)
+            )
             if min(same, turned) <= config.distance:
                 found[name] = Rejection("mirrored_copy" if turned < same else "copy", other=other)
                 break
@@ -82,12 +89,39 @@ def mirrored(seen: Poses) -> Poses:
 def distance(one: Poses, two: Poses, config: DuplicateConfig) -> float:
     """Return the least mean distance over all delays, which cost a little; infinite when nothing
     overlaps."""
-    shortest = min(len(one), len(two))
-    least = max(2, int(config.overlap * shortest))
-    longest = int(config.lag_s * config.rate)
-    lags = range(-longest, longest + 1)
-    costs = (_at(one, two, lag, least) + DELAY_COST * abs(lag) / config.rate for lag in lags)
+    least = _least(one, two, config)
+    costs = (
+        _at(one, two, lag, least) + DELAY_COST * abs(lag) / config.rate for lag in _lags(config)
+    )
     return min(costs, default=np.inf)
+
+
+def _may_be_copies(one: Poses, two: Poses, config: DuplicateConfig) -> bool:
+    """Return whether a few poses of one clip come near those of the other at any delay; a tenth of
+    the work of `distance`."""
+    lags = np.array(_lags(config))
+    overlap = np.minimum(len(one), len(two) + lags) - np.maximum(lags, 0)
+    lags = lags[overlap >= _least(one, two, config)]
+    step = min(round(config.rate), len(one) // ROUGH_POSES)
+    rows = np.arange(0, len(one), max(1, step))
+    at = rows[:, None] - lags
+    inside = (at >= 0) & (at < len(two))
+    apart = np.linalg.norm(one[rows, None] - two[np.clip(at, 0, len(two) - 1)], axis=-1).mean(-1)
+    seen = inside & ~np.isnan(apart)
+    count = seen.sum(0)
+    near = np.where(seen, apart, 0.0).sum(0) <= ROUGH_FACTOR * config.distance * count
+    return bool((near | (count < ROUGH_LEAST)).any())
+
+
+def _least(one: Poses, two: Poses, config: DuplicateConfig) -> int:
+    """Return how many poses both clips must show."""
+    return max(2, int(config.overlap * min(len(one), len(two))))
+
+
+def _lags(config: DuplicateConfig) -> range:
+    """Return the delays that are compared, poses."""
+    longest = int(config.lag_s * config.rate)
+    return range(-longest, longest + 1)
 
 
 def _at(one: Poses, two: Poses, lag: int, least: int) -> float:

@@ -171,8 +171,8 @@ def _digest(robot: Robot, motion: ReferenceMotion, control: ControlConfig) -> st
     del motors["action_scale"]  # of the policy: the feedback is bounded by the robot's own
     described = replace(robot.description, robust_action_factor=NAMED_FACTOR)
     facts = [poses_sha256(motion), robot.sha256, named, actuation_facts(robot, ControlConfig()),
-             motors, settings(), description_sha256(described), robot.contact_names,
-             mujoco.__version__]  # fmt: skip
+             motors, settings(), description_sha256(described, robot.joint_names),
+             robot.contact_names, mujoco.__version__]  # fmt: skip
     if law.feedback_path == "sampled":
         facts.append(sampled_regulator.settings())
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode())

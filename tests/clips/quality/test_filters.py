@@ -6,9 +6,15 @@ import pytest
 
 from robojackson.clips.people.camera_motion import CameraConfig, CameraMotion, displacement, spread
 from robojackson.clips.people.person_extent import MIRROR, box, full_body, heights_px
+from robojackson.clips.quality import duplicates
 from robojackson.clips.quality.cuts import Changes, CutConfig, leaps, together
 from robojackson.clips.quality.drawing import flat_share
-from robojackson.clips.quality.duplicates import DuplicateConfig, find_duplicates
+from robojackson.clips.quality.duplicates import (
+    DuplicateConfig,
+    distance,
+    find_duplicates,
+    poses,
+)
 from robojackson.clips.rejection import Rejection
 from robojackson.motion.landmark_track import LandmarkTrack
 
@@ -185,6 +191,28 @@ def test_a_copy_that_starts_later_is_found() -> None:
         {"whole": track_of(whole), "end": track_of(whole[30:])}, DuplicateConfig()
     )
     assert found == {"end": Rejection("copy", other="whole")}
+
+
+@pytest.mark.parametrize("seconds", [2, 9, 20])
+@pytest.mark.parametrize("noise_share", [0.0, 0.02, 0.06, 0.3])
+def test_a_few_poses_find_the_copies_that_all_poses_find(seconds: int, noise_share: float) -> None:
+    """Noise of body heights on either side of the limit, frames without a person, a delay."""
+    rng, config = np.random.default_rng(seconds), DuplicateConfig()
+    whole = dance(30 * (seconds + 1), seed=seconds)
+    other = whole[30:] + noise_share * 0.6 * rng.uniform(-1.0, 1.0, whole[30:].shape) / [2.0, 1.0]
+    other[rng.random(len(other)) < 0.2] = np.nan
+    one, two = poses(track_of(whole), config.rate), poses(track_of(other), config.rate)
+    all_poses = distance(two, one, config) <= config.distance
+    assert bool(find_duplicates({"a": track_of(whole), "b": track_of(other)}, config)) == all_poses
+
+
+def test_of_clips_that_differ_only_a_few_poses_are_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else forty clips take fifteen seconds of a core."""
+    tracks = {str(seed): track_of(dance(300, seed=seed)) for seed in range(4)}
+    monkeypatch.setattr(duplicates, "distance", None)  # calling it is an error
+    assert find_duplicates(tracks, DuplicateConfig()) == {}
 
 
 def test_clips_without_a_person_are_no_copies_of_one_another() -> None:

@@ -71,6 +71,17 @@ def test_the_database_of_prefects_own_home_is_taken(
     assert f"none at {tmp_path}/home/prefect.db" in out
 
 
+def test_the_home_of_the_database_may_begin_with_a_tilde(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "user"))
+    monkeypatch.setenv("PREFECT_HOME", "~/pf")
+    (tmp_path / "user").mkdir()
+    (Path(store.root) / "prefect").rename(tmp_path / "user" / "pf")
+    _, out, _ = invoke("backup", tmp_path / "backups", "--json")
+    assert json.loads(out)["database"] == str(tmp_path / "user" / "pf" / "prefect.db")
+
+
 def test_a_server_whose_database_is_unknown_is_not_left_out_silently(
     store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,15 @@ def test_a_study_of_a_robot_whose_model_is_missing_names_the_command(store_folde
         study_of("g1", {})
 
 
+def test_a_study_whose_name_has_a_dot_is_found_in_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "studies").mkdir()
+    (tmp_path / "studies" / "v1.2.yaml").write_text("extends: studies/smoke\nname: other\n")
+    monkeypatch.setenv("ROBOJACKSON_CONFIGS", str(tmp_path))
+    assert study_of("v1.2", {}).name == "other"
+
+
 def test_the_study_of_the_g1_is_scratch_and_walker_on_three_moves_and_five_seeds() -> None:
     expected = load(Study, "studies/g1")
     assert (expected.setups, len(expected.moves), len(expected.seeds)) == (

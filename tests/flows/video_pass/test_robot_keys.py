@@ -1,6 +1,7 @@
 """A robot of a user's own in the stages: known by what it is, never by where it lies."""
 
 import asyncio
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,18 +11,26 @@ from flows.study.study_plan import study_of
 from robojackson.errors import UnknownName
 from robojackson.pipeline.robot_descriptions import describe_robot, read_description
 from robojackson.retarget.retarget_config import RetargetConfig
+from robojackson.rl.config.train_config import TrainConfig
+from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import load_robot
 from storage.artifact import Artifact
 from tasks.retarget_motion import retarget_motion
 from tasks.runtime.robot_digests import robot_file
 from tasks.runtime.stage import identity
+from tasks.train_policy import RunLabels, run_id_of
 from tests.fixtures.own_robot import own_robot
 
 
 def key(robot: Path) -> str:
+    """Return the key under which a motion for the robot of a file is recorded."""
+    return motion_key(describe_robot(str(robot)))
+
+
+def motion_key(robot: RobotDescription) -> str:
     """Return the key under which a motion for a robot is recorded."""
     sequence = Artifact(key="smpl", sha256="0" * 64)
-    given = {"sequence": sequence, "robot": describe_robot(str(robot)), "config": RetargetConfig()}
+    given = {"sequence": sequence, "robot": robot, "config": RetargetConfig()}
     return retarget_motion.recipe.key(given)
 
 
@@ -44,6 +53,17 @@ def test_another_weight_or_another_model_is_another_robot(
     before, altered = key(path), path.parent / file
     altered.write_text(altered.read_text().replace(old, new))
     assert key(path) != before
+
+
+@pytest.mark.parametrize("part", ["torque_limits", "contacts"])
+def test_another_order_of_patterns_or_contacts_is_another_robot(part: str) -> None:
+    """The last pattern that matches counts, and contacts are the columns of a motion."""
+    robot = describe_robot("humanoid")
+    turned = replace(robot, **{part: dict(reversed(getattr(robot, part).items()))})
+    config, labels = TrainConfig(), RunLabels("move", "setup")
+    assert motion_key(turned) != motion_key(robot)
+    ids = {run_id_of(Artifact("r", "0" * 64), one, config, labels) for one in (robot, turned)}
+    assert len(ids) == 2
 
 
 def test_a_process_reads_the_description_that_the_stage_was_given(tmp_path: Path) -> None:
