@@ -1,13 +1,15 @@
-"""Poses and velocities of a robot's bodies and sites in every frame, as MuJoCo computes them.
+"""Bodies of a compiled model: which are the robot's, which its feet, and their states by frame.
 
-World frame, metres, radians, seconds, quaternions wxyz; bodies in MuJoCo's order, the world first.
+Those that its free joint carries are the robot's. A stage, a box or a marker beside it is fixed to
+the world, and is part of that. World frame, metres, radians, seconds, kilograms, quaternions wxyz;
+bodies in MuJoCo's order, the world first.
 """
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from robojackson.errors import UnknownName
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -72,6 +74,46 @@ def drawn_geoms(model: mujoco.MjModel) -> Int[np.ndarray, " G"]:
     return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
 
 
+def own_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
+    """Return whether each body is the robot's; the free joint is the first."""
+    result: np.ndarray = model.body_rootid == model.jnt_bodyid[0]
+    return result
+
+
+def own_mass(model: mujoco.MjModel) -> Float[np.ndarray, " B"]:
+    """Return the mass of each body of the robot, zero of the others, kg."""
+    result: np.ndarray = np.where(own_bodies(model), model.body_mass, 0.0)
+    return result
+
+
+def fixed_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
+    """Return whether each body is the world or fixed to it."""
+    result: np.ndarray = model.body_weldid == 0
+    return result
+
+
+def foot_bodies(model: mujoco.MjModel, contacts: Int[np.ndarray, " C"]) -> Int[np.ndarray, " F"]:
+    """Return the bodies of the feet: those of the contacts and what is welded below them.
+
+    A body that touches nothing, such as a frame under the sole, stands for the nearest body above
+    it that does and that it is welded to: beyond that is the leg, to which a foot without an ankle
+    is welded, too.
+
+    Args:
+        contacts: Bodies of its contact points.
+    """
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    touching = np.isin(np.arange(model.nbody), model.geom_bodyid[solid])
+    found: set[int] = set()
+    for body in contacts:
+        foot = _welded_below(model, int(body))
+        while not touching[foot].any() and model.body_weldid[body] != body:
+            body = model.body_parentid[body]
+            foot = _welded_below(model, int(body))
+        found.update(foot)
+    return np.array(sorted(found))
+
+
 def _row(
     model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray, qvel: np.ndarray
 ) -> tuple[np.ndarray, ...]:
@@ -85,3 +127,11 @@ def _row(
         mujoco.mj_objectVelocity(model, data, kind, body, speed[body], 0)
     parts = (data.xpos, data.xquat, speed[:, 3:], speed[:, :3], data.cvel, data.subtree_com)
     return tuple(part.copy() for part in (*parts, data.site_xpos, data.site_xmat))
+
+
+def _welded_below(model: mujoco.MjModel, body: int) -> list[int]:
+    found = [body]
+    for child in range(body + 1, model.nbody):  # parents come first
+        if model.body_parentid[child] in found and not model.body_jntnum[child]:
+            found.append(child)
+    return found

@@ -16,14 +16,13 @@ import numpy as np
 
 from robojackson.errors import BadConfiguration
 from robojackson.robot.actuation import both_ways
-from robojackson.robot.contact_guess import guess_contacts, toe_of
 from robojackson.robot.description import KEYPOINTS, TOES, ContactPoint
 from robojackson.robot.fall import rule_lines
 from robojackson.robot.keypoint_guess import Guess, guess_keypoints
 from robojackson.robot.limbs import SIDES, skeleton_of
 from robojackson.robot.model_files import read_model
 from robojackson.robot.names import robot_name
-from robojackson.robot.rest_guess import guess_rest
+from robojackson.robot.stand_guess import guess_contacts, guess_rest, toe_of
 
 WEIGHTS = {"foot": 1.5, "hand": 1.5, "head": 0.5, "toe": 0.7, "pelvis": 0.0}
 """Of the squared error, by the end of a keypoint's name; the others have 1. As Humanoid-v5's."""

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.geometry.rotations import quat_to_matrix
+from robojackson.robot.body_states import own_bodies, own_mass
 from robojackson.robot.model import Robot
-from robojackson.robot.own_bodies import own_bodies, own_mass
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float, Int
 from robojackson.errors import BadConfiguration
 from robojackson.files.file_tree import FileTree
 from robojackson.robot.actuation import Actuation, actuation_of, per_hinge
+from robojackson.robot.body_states import foot_bodies, own_mass
 from robojackson.robot.checks import check_model, check_names, check_soles, check_symmetry
 from robojackson.robot.description import (
     KEYPOINTS,
@@ -26,10 +27,8 @@ from robojackson.robot.description import (
     RobotDescription,
     RobotSource,
 )
-from robojackson.robot.feet import foot_bodies
 from robojackson.robot.mjcf import compiled, mjcf_path, model_sha256, site_of
 from robojackson.robot.names import known, where
-from robojackson.robot.own_bodies import own_mass
 from robojackson.robot.physics import MOST_SUBSTEPS, substeps_of
 
 __all__ = [

@@ -4,12 +4,13 @@ Metres, seconds, newton-metres. What the description does not name stays as the 
 description without these keys compiles to the stock model.
 """
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 
 from robojackson.robot.actuation import both_ways, per_hinge
 from robojackson.robot.description import RobotDescription
-from robojackson.robot.feet import foot_geoms
 from robojackson.robot.fixed_joints import fix_joints, remove
 from robojackson.robot.model_files import free_name
 from robojackson.robot.names import known, where
@@ -130,8 +131,27 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
         floors = [geom for geom in spec.geoms if _is_floor(geom)]
         # A body that the model has not is refused by name where contacts are bound.
         bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
-        for geom in floors + [geom for body in bodies for geom in foot_geoms(body)]:
+        for geom in floors + [geom for body in bodies for geom in _foot_geoms(body)]:
             geom.friction = [stepping.friction, *geom.friction[1:]]
+
+
+def _foot_geoms(body: mujoco.MjsBody) -> list[mujoco.MjsGeom]:
+    """Return the geoms of the foot of a contact's body: `body_states.foot_bodies` of a spec."""
+    geoms = list(_geoms_below(body))
+    while not (body.joints or any(geom.contype or geom.conaffinity for geom in geoms)):
+        if body.parent.name == "world":
+            break
+        body = body.parent
+        geoms = list(_geoms_below(body))
+    return geoms
+
+
+def _geoms_below(body: mujoco.MjsBody) -> Iterator[mujoco.MjsGeom]:
+    """Yield the geoms of a body and of those that are welded below it."""
+    yield from body.geoms
+    for child in body.bodies:
+        if not child.joints:
+            yield from _geoms_below(child)
 
 
 def integrator_of(name: str) -> mujoco.mjtIntegrator:

@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
 from robojackson.retarget.feasibility.force_model import once_a_robot, unconstrained
 from robojackson.retarget.targets.ground_contact import GRAVITY
+from robojackson.robot.body_states import own_mass
 from robojackson.robot.model import Robot
-from robojackson.robot.own_bodies import own_mass
 from robojackson.robot.resampling import accelerations, velocities
 from robojackson.robot.tree_kinematics import Posed, pose, tree
 

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.retarget.feasibility.force_model import once_a_robot
+from robojackson.robot.body_states import fixed_bodies
 from robojackson.robot.model import Robot
-from robojackson.robot.own_bodies import fixed_bodies
 from robojackson.robot.tree_kinematics import Posed, Tree, placed
 
 _FLOOR_BIT = 1 << 30

@@ -11,8 +11,8 @@ from jaxtyping import Float, Int
 from robojackson.geometry.rotations import heading
 from robojackson.rl.config.train_config import ResetConfig
 from robojackson.rl.sim.reference_clip import STRIDE, Clip
+from robojackson.robot.body_states import own_bodies
 from robojackson.robot.model import Robot
-from robojackson.robot.own_bodies import own_bodies
 
 BIN_SECONDS, MOST_BINS = 0.25, 250
 FORGET, FORGET_OF_MANY = 0.02, 0.1

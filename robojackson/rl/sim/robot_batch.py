@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from robojackson.rl.config.train_config import ControlConfig
 from robojackson.rl.sim.motors import Motors
-from robojackson.robot.own_bodies import own_mass
+from robojackson.robot.body_states import own_mass
 
 SIZE = 8
 """Number of robots in a batch."""

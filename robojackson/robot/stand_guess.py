@@ -1,11 +1,13 @@
-"""Balls under the feet of a model without a description: the corners of what it stands on.
+"""The stand of a model without a description: its rest pose, and the balls under its feet.
 
-A foot that is one ball gets one contact; any other those four of its lowest points that are
-furthest out. Metres; x forward, y left, z up in the zero pose.
+The balls are the corners of what it stands on: a foot that is one ball gets one contact; any other
+those four of its lowest points that are furthest out. Metres, radians; x forward, y left, z up in
+the zero pose.
 """
 
 from dataclasses import dataclass
 from itertools import product
+from math import copysign
 
 import mujoco
 import numpy as np
@@ -28,6 +30,12 @@ CORNERS = {
     "toe_out": ("toe", 1, 1), "toe_in": ("toe", 1, -1),
 }  # fmt: skip
 """Label, forward or back, out or in."""
+BENT_RAD = 0.3
+"""How far the knees are bent at rest; hips and ankles half as far."""
+SIDEWAYS = 0.9
+"""Least share of y in the axis of a hinge that bends a leg forward."""
+DIGITS = 4
+"""Decimals of a rest angle at the limit of its hinge."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +84,43 @@ def toe_of(
     offset = np.mean([ball.offset for ball in balls], axis=0) + foot.offset
     x, y, z = np.round(offset, 4) + 0.0
     return Guess(foot.body, (float(x), float(y), float(z)), "between the front corners", foot.sure)
+
+
+def guess_rest(skeleton: Skeleton) -> dict[str, float]:
+    """Return knees a little bent over level feet, radians; hinges that cannot be zero are at a
+    limit, none beyond it."""
+    model, found = skeleton.model, dict[str, float]()
+    for hinge in np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
+        low, high = model.jnt_range[hinge]
+        if model.jnt_limited[hinge] and not low <= 0.0 <= high:
+            found[model.joint(hinge).name] = _nearest_to_zero(float(low), float(high))
+    bent: dict[str, float] = {}
+    for side in SIDES:
+        leg = skeleton.limbs.get(f"{side}_leg")
+        if leg is None:
+            return found
+        turns = {"hip": -BENT_RAD / 2, "knee": BENT_RAD, "ankle": -BENT_RAD / 2}
+        for part, turn in turns.items():
+            if part == "ankle" and not leg.parts[part]:
+                continue
+            across = [h for h in leg.parts[part] if abs(skeleton.data.xaxis[h][1]) > SIDEWAYS]
+            if not across:
+                return found
+            angle = turn * float(np.sign(skeleton.data.xaxis[across[0]][1]))
+            low, high = model.jnt_range[across[0]]
+            if model.jnt_limited[across[0]] and not low < angle < high:
+                return found
+            bent[model.joint(across[0]).name] = angle
+    return found | bent
+
+
+def _nearest_to_zero(low: float, high: float) -> float:
+    """Return the angle of a range without zero that is nearest to zero, rounded into the range;
+    the limit itself in a range that holds no such angle."""
+    limit = low if low > 0.0 else high
+    near = round(limit, DIGITS)
+    inward = round(near + copysign(10.0**-DIGITS, limit), DIGITS)
+    return next((angle for angle in (near, inward) if low <= angle <= high), limit)
 
 
 def _contact(skeleton: Skeleton, ball: _Ball, foot: Guess, side: str, label: str) -> ContactPoint:
