@@ -204,6 +204,7 @@ def test_a_link_to_a_configuration_elsewhere_is_one_of_its_folder(monkeypatch, t
     for inner in ("configs", "configs/setups"):
         (tmp_path / inner).mkdir()
         (tmp_path / inner / "own.yaml").symlink_to(tmp_path / "shared.yaml")
+    monkeypatch.delenv("ROBOJACKSON_CONFIGS", raising=False)
     monkeypatch.chdir(tmp_path)
     found = [configuration_files.find(name) for name in ("own", "setups/own")]
     assert found == [tmp_path / "configs/own.yaml", tmp_path / "configs/setups/own.yaml"]

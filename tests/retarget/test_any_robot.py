@@ -198,7 +198,7 @@ def test_a_motion_for_hinges_without_motors_is_read_again(
 
 @pytest.mark.parametrize(
     ("changes", "limit"),
-    [({}, 30.0), ({"torque_limits": {"waist": 80.0}}, 80.0), ({"gear_scale": 3.0}, 30.0)],
+    [({}, 30.0), ({"torque_limits": {"waist": 80.0}}, 80.0), ({"gear_scale": 3.0}, 90.0)],
 )
 def test_the_waist_gives_what_is_certified(description, changes: dict[str, object], limit: float):
     robot = load_robot(replace(description, **changes))
