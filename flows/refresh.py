@@ -53,6 +53,8 @@ from tasks.probe_video import SourceFile, probe_video
 
 OF_THE_VIDEO = (UnreadableVideo, VideoTooLong, TrackTooShort, NoPersonFound)
 """Errors of a motion that another video may not have; all others are the machine's."""
+MOST_TRIES = 4
+"""Videos of a dance of which a night tries a motion: where more fail, the fault is another."""
 CHOSEN_COLUMNS = ("video_id", "url", "title", "score_per_second", "stability_score")
 Facts = dict[str, Any]
 
@@ -158,18 +160,18 @@ async def refresh_dance(
         raise NoPersonFound(nothing(found))
     video = in_good_quality(found.chosen, settings) if found.chosen else None
     is_new = found.chosen is not None
-    while True:
-        if chosen["decision"] != "chosen":
-            chosen, is_new = {**chosen, **_decided("chosen", "")}, True
-            candidate_catalogue.append(store, [chosen])
+    for left in reversed(range(MOST_TRIES)):
         try:
             made = motion(store, video or of_champion(chosen, settings), stages)
+            if chosen["decision"] != "chosen":
+                chosen, is_new = {**chosen, **_decided("chosen", "")}, True
+                candidate_catalogue.append(store, [chosen])
             break
         except OF_THE_VIDEO as cause:
             reason = f"no motion could be made of it: {reason_of(cause)}"
             candidate_catalogue.append(store, [{**chosen, **_decided("failed", reason)}])
             other = _best_so_far(mine, settings)
-            if other is None:
+            if other is None or not left:
                 raise
             title = clean_text(other["title"] or other["video_id"], REASON_LENGTH)
             get_run_logger().warning("%s: %s; %s is danced", entry.name, cause, title)

@@ -5,10 +5,13 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 GROUPS, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 """Linux's control groups, and the file that names those of this process."""
+MOST = 1 << 20
+"""Cores of a process without a quota, before its affinity."""
 V1 = ("cpu", "cpu,cpuacct")
 """Folders of the older control groups that may have a quota."""
 
@@ -21,7 +24,13 @@ def cores(groups: Path = GROUPS, own: Path = OWN) -> int:
         own: File that names those of the process.
     """
     here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min([here, *map(math.ceil, _quotas(groups, own))]))
+    return max(1, min(here, _quota(groups, own)))
+
+
+@cache
+def _quota(groups: Path, own: Path) -> int:
+    """Return the least quota, rounded up, read once a process: searches ask at every step."""
+    return math.ceil(min(_quotas(groups, own), default=MOST))
 
 
 def _quotas(groups: Path, own: Path) -> Iterator[float]:

@@ -77,11 +77,15 @@ def answering(
         yield run_query
 
 
+OF_ALL = {"query", "query_table", "columns", "duckdb_columns", "show", "describe", "summarize"}
+"""Words of questions that may read a table without its name, or list its columns."""
+
+
 def named_in(sql: str, known: Iterable[str]) -> set[str]:
     """Return the tables that a question may read: those whose names are in it, or, where a name may
-    be put together (`query_table`), all."""
+    be put together or the columns of all are listed, all."""
     words = set(re.findall(r"\w+", sql.lower()))
-    return set(known) if words & {"query", "query_table"} else words & set(known)
+    return set(known) if words & OF_ALL else words & set(known)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from robojackson.robot.names import known, matching, where
 _SYMMETRY_M = 1e-3
 _LEVEL_M = 0.005
 _FLOOR_M, _FLOOR_RAD = 1e-4, 1e-3
+_WALL_RAD = 1.0  # a plane that is tilted so far is a wall
 _BONES = (("hip", "knee"), ("knee", "foot"), ("shoulder", "elbow"), ("elbow", "hand"))
 _LABELS = ("left", "right")
 
@@ -36,8 +37,8 @@ def check_joints(model: mujoco.MjModel, description: RobotDescription) -> None:
 
 
 def check_floor(model: mujoco.MjModel, description: RobotDescription) -> None:
-    """Require that every plane that can be touched is level at z = 0, where motions have their
-    floor."""
+    """Require that every plane that can be touched, walls apart, is level at z = 0, where motions
+    have their floor."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     touches = (model.geom_contype | model.geom_conaffinity) != 0
@@ -45,7 +46,7 @@ def check_floor(model: mujoco.MjModel, description: RobotDescription) -> None:
     for index in np.flatnonzero(planes):
         height, up = float(data.geom_xpos[index, 2]), float(data.geom_xmat[index, 8])
         tilt = float(np.arccos(np.clip(up, -1.0, 1.0)))
-        if abs(height) > _FLOOR_M or tilt > _FLOOR_RAD:
+        if tilt < _WALL_RAD and (abs(height) > _FLOOR_M or tilt > _FLOOR_RAD):
             raise BadConfiguration(
                 f"{where(description, 'mjcf')}: the plane {model.geom(index).name!r} is at "
                 f"z = {height:g} m and {np.degrees(tilt):.3g} degrees from level, and motions "

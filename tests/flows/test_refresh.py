@@ -307,6 +307,20 @@ def test_where_every_choice_fails_the_steadiest_fit_video_is_danced_and_stays_th
     assert night.champion == "steady"
 
 
+def test_a_fault_of_every_video_does_not_use_up_the_catalogue(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    night = Night(Store(tmp_path), monkeypatch, {})
+    monkeypatch.setattr(nightly, "MOST_TRIES", 2)
+    for name, score in (("steady", 0.2), ("shaky", 0.9)):
+        night.assess(name, "accepted", score)
+    night.faults.update(dict.fromkeys(("new", "old", "oldest", "steady"), TrackTooShort("1 frame")))
+    with pytest.raises(TrackTooShort):
+        night.refreshed()
+    accepted = {row["video_id"] for row in candidate_catalogue.accepted(night.store, "APT")}
+    assert accepted == {"steady", "shaky"}
+
+
 def test_a_night_that_finds_nothing_dances_what_an_earlier_one_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

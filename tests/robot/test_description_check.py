@@ -98,6 +98,11 @@ def test_a_floor_that_is_not_level_at_zero_is_refused(
         load_robot(described)
 
 
+def test_a_wall_is_no_floor(humanoid: RobotDescription, tmp_path: Path) -> None:
+    planes = PLANE.format("ground", "") + PLANE.format("wall", 'pos="3 0 0" euler="0 -90 0"')
+    assert problems(with_floor(tmp_path, humanoid, planes)) == []
+
+
 @pytest.mark.parametrize(
     "floor",
     ['<geom name="floor" type="box" size="9 9 .1" pos="0 0 -.1"/>',

@@ -46,3 +46,12 @@ def test_a_question_without_end_is_interrupted(
     monkeypatch.setattr(sql_tables, "MOST_SECONDS", 0.3)
     with pytest.raises(BadTable, match=r"no answer in 0\.3 s"):
         study_tables.query(Store(tmp_path), "SELECT count(*) FROM range(10000000) a, range(9999) b")
+
+
+@pytest.mark.parametrize(
+    ("sql", "expected"),
+    [("SELECT 1 FROM Runs", {"runs"}), ("SELECT * FROM information_schema.columns", {"runs", "b"}),
+     ("DESCRIBE", {"runs", "b"}), ("SELECT 1", set())],
+)  # fmt: skip
+def test_a_question_about_columns_reads_all_tables(sql: str, expected: set[str]) -> None:
+    assert sql_tables.named_in(sql, ("runs", "b")) == expected

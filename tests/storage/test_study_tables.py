@@ -164,17 +164,16 @@ def test_a_question_reads_the_tables_that_it_names(sql: str, expected: int, stor
 def test_the_joined_file_of_a_finished_study_is_read_as_its_cells(
     store: Store, tmp_path: Path
 ) -> None:
-    """As docs/scaling.md joins them; a cell that is published again counts once."""
+    """As docs/scaling.md joins them, night after night; a cell that is published again counts
+    once."""
     for seed in range(3):
         study_tables.write(store, cell(seed, f"r{seed}"), made(store, seed))
     page = (Path(__file__).parents[2] / "docs" / "scaling.md").read_text()
     script = page.split("```python\n")[1].split("```")[0]
-    subprocess.run(
-        [sys.executable, "-c", script, tmp_path / "metrics" / "evaluations" / "study=smoke"],
-        check=True,
-    )
-    assert len(store.list("metrics/evaluations")) == 1
-    for expected in (3.0, 3.0):
+    folder = tmp_path / "metrics" / "evaluations" / "study=smoke"
+    for expected in (3.0, 3.0, 3.0):
+        subprocess.run([sys.executable, "-c", script, folder], check=True)
+        assert len(store.list("metrics/evaluations")) == 1
         sql = "SELECT sum(survived_s) AS s FROM evaluations"
         assert study_tables.query(store, sql) == [{"s": expected}]
         assert study_tables.read(store, "evaluations", "smoke", {"r1"}).num_rows == 1

@@ -8,6 +8,7 @@ from robojackson.cli.cards import closing, command_line
 from robojackson.errors import BadConfiguration, RoboJacksonError, StoreError
 from robojackson.files.file_tree import FileTree
 from robojackson.pipeline.robot_descriptions import describe_robot, is_file, robot_names
+from robojackson.robot.body_states import own_mass
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.model import Robot
 
@@ -150,7 +151,7 @@ def _figures(robot: Robot) -> Figures:
         "name": robot.description.name,
         "hinges": len(robot.joint_names),
         "motors": int(robot.actuated.sum()),
-        "mass_kg": float(model.body_mass.sum()),
+        "mass_kg": float(own_mass(model).sum()),
         "height_m": float(pose.high[2]),
         "joints": ranges,
         "keypoints": {key: bodies[key] for key in pose.keypoints},

@@ -8,6 +8,7 @@ from robojackson.report.web.live_data import live_data
 from robojackson.report.web.pane_camera import MARGIN_M
 from robojackson.report.web.shown_run import RecordedRun
 from robojackson.rl.policy import Policy
+from robojackson.robot.body_states import own_mass
 
 SCRIPTS = ("scene.js", "dance.js", "live.js")
 STYLES = ("page.css",)
@@ -35,7 +36,7 @@ def live_page(run: RecordedRun, title: str) -> str | None:
     dancer = "trained policy"
     if not isinstance(run.policy, Policy):
         dancer = f"tracker {run.policy.description.name}"
-    points, mass = np.asarray(run.reference.keypoints_w), float(run.robot.model.body_mass.sum())
+    points, mass = np.asarray(run.reference.keypoints_w), float(own_mass(run.robot.model).sum())
     around = np.linalg.norm(points[..., :2] - run.reference.qpos[:, None, :2], axis=-1)
     data |= {
         "height": ROOM * float(points[..., 2].max()),
