@@ -36,6 +36,8 @@ MOST_ROWS = 100_000
 MOST_MEMORY = 2**29
 ASKING = frozenset({"SELECT", "EXPLAIN", "PRAGMA", "CALL", "MULTI"})
 """DuckDB's types of statements that answer with rows; `MULTI` is a `PIVOT`."""
+OF_ALL = {"query", "query_table", "columns", "duckdb_columns", "show", "describe", "summarize"}
+"""Words of questions that may read a table without its name, or list its columns."""
 
 
 @contextmanager
@@ -75,10 +77,6 @@ def answering(
                 raise BadTable(f"{about}: {' '.join(str(cause).split())}"[:2000]) from cause
 
         yield run_query
-
-
-OF_ALL = {"query", "query_table", "columns", "duckdb_columns", "show", "describe", "summarize"}
-"""Words of questions that may read a table without its name, or list its columns."""
 
 
 def named_in(sql: str, known: Iterable[str]) -> set[str]:

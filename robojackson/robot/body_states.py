@@ -92,6 +92,12 @@ def fixed_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
     return result
 
 
+def solid_geoms(model: mujoco.MjModel) -> Bool[np.ndarray, " G"]:
+    """Return whether each geom can touch another."""
+    result: np.ndarray = (model.geom_contype | model.geom_conaffinity) != 0
+    return result
+
+
 def foot_bodies(model: mujoco.MjModel, contacts: Int[np.ndarray, " C"]) -> Int[np.ndarray, " F"]:
     """Return the bodies of the feet: those of the contacts and what is welded below them.
 
@@ -102,8 +108,7 @@ def foot_bodies(model: mujoco.MjModel, contacts: Int[np.ndarray, " C"]) -> Int[n
     Args:
         contacts: Bodies of its contact points.
     """
-    solid = (model.geom_contype | model.geom_conaffinity) != 0
-    touching = np.isin(np.arange(model.nbody), model.geom_bodyid[solid])
+    touching = np.isin(np.arange(model.nbody), model.geom_bodyid[solid_geoms(model)])
     found: set[int] = set()
     for body in contacts:
         foot = _welded_below(model, int(body))

@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 
 from robojackson.errors import BadConfiguration
+from robojackson.robot.body_states import solid_geoms
 from robojackson.robot.description import RobotDescription
 from robojackson.robot.names import known, matching, where
 
@@ -41,11 +42,16 @@ def check_floor(model: mujoco.MjModel, description: RobotDescription) -> None:
     have their floor."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    touches = (model.geom_contype | model.geom_conaffinity) != 0
-    planes = touches & (model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE))
-    for index in np.flatnonzero(planes):
-        height, up = float(data.geom_xpos[index, 2]), float(data.geom_xmat[index, 8])
-        tilt = float(np.arccos(np.clip(up, -1.0, 1.0)))
+    plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
+    planes = np.flatnonzero(solid_geoms(model) & plane)
+    tilts = np.arccos(np.clip(data.geom_xmat[planes, 8], -1.0, 1.0))
+    if len(planes) and (tilts > _WALL_RAD).all():
+        raise BadConfiguration(
+            f"{where(description, 'mjcf')}: the plane {model.geom(planes[0]).name!r} is a wall and "
+            "there is no floor; add a plane that is level at z = 0"
+        )
+    for index, tilt in zip(planes, tilts, strict=True):
+        height = float(data.geom_xpos[index, 2])
         if tilt < _WALL_RAD and (abs(height) > _FLOOR_M or tilt > _FLOOR_RAD):
             raise BadConfiguration(
                 f"{where(description, 'mjcf')}: the plane {model.geom(index).name!r} is at "

@@ -99,8 +99,10 @@ def test_a_floor_that_is_not_level_at_zero_is_refused(
 
 
 def test_a_wall_is_no_floor(humanoid: RobotDescription, tmp_path: Path) -> None:
-    planes = PLANE.format("ground", "") + PLANE.format("wall", 'pos="3 0 0" euler="0 -90 0"')
-    assert problems(with_floor(tmp_path, humanoid, planes)) == []
+    wall = PLANE.format("wall", 'pos="3 0 0" euler="0 -90 0"')
+    assert problems(with_floor(tmp_path, humanoid, PLANE.format("ground", "") + wall)) == []
+    (line,) = problems(with_floor(tmp_path, humanoid, wall))
+    assert "'wall' is a wall and there is no floor" in line
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ from robojackson.rl.sim.motors import Motors, gains, residual_scale
 from robojackson.rl.sim.preview import preview_of
 from robojackson.rl.trackers.policy_tracker import PolicyTracker
 from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
+from robojackson.robot.body_states import solid_geoms
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
 from robojackson.robot.names import PELVIS
@@ -154,6 +155,5 @@ def _odometry(robot: Robot) -> dict[str, object]:
 
 
 def _has_colliding_meshes(model: mujoco.MjModel) -> bool:
-    solid = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
     kinds = (int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-    return bool((solid & np.isin(model.geom_type, kinds)).any())
+    return bool((solid_geoms(model) & np.isin(model.geom_type, kinds)).any())

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from robojackson.retarget.feasibility.contact_wrench import Demand, Tolerance
 from robojackson.retarget.feasibility.force_model import once_a_robot, unconstrained
 from robojackson.retarget.targets.ground_contact import GRAVITY
-from robojackson.robot.body_states import own_mass
+from robojackson.robot.body_states import own_mass, solid_geoms
 from robojackson.robot.model import Robot
 from robojackson.robot.resampling import accelerations, velocities
 from robojackson.robot.tree_kinematics import Posed, pose, tree
@@ -158,7 +158,7 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
     the two, or that of the one with the higher priority. Of a foot's geoms the most slippery
     counts."""
     model = robot.model
-    touches = (model.geom_contype | model.geom_conaffinity) != 0
+    touches = solid_geoms(model)
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
     floor = np.flatnonzero(plane & touches)
     found = np.empty(len(robot.contact_bodies))

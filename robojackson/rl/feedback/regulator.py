@@ -195,8 +195,8 @@ def riccati(
         effort: Factor on the weight of offsets of the targets: below 1 the feedback is stiffer.
     """
     steps, size = linear.defect.shape
-    cost, stiff = weights(action, size)
-    stiff = effort * stiff
+    cost, of_offsets = weights(action, size)
+    of_offsets = effort * of_offsets
     gain, offset = np.zeros((steps, len(action), size)), np.zeros((steps, len(action)))
     values, slopes = np.zeros((steps, size, size)), np.zeros((steps, size))
     value, slope = cost, np.zeros(size)
@@ -205,7 +205,7 @@ def riccati(
     order = order if cyclic else np.concatenate([np.full(STILL, steps - 2), order])
     for t in order:
         a, b, missed = linear.by_state[t], linear.by_target[t], linear.defect[t]
-        weighted = stiff + b.T @ value @ b
+        weighted = of_offsets + b.T @ value @ b
         wanted = b.T @ np.column_stack([value @ a, value @ missed + slope])
         wanted[:, -1] += pull.target[t]
         both = np.linalg.solve(weighted, wanted)

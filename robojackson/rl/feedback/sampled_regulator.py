@@ -86,8 +86,8 @@ def sampled_regulator(
         rng = np.random.default_rng([seed, number])
         search = PathSearch(sim, action, feet, rule, reference, rng)
         path, along, ended = _searched(search, sim, reference, linear, action, clip.dt, progress)
-        gains_of = partial(_gains, sim, clip, action, feet, path, along, reference)
-        now = _best_effort(trial, gains_of)
+        nominal = _followed(sim, clip, path, along)
+        now = _best_effort(trial, partial(_gains, clip, action, feet, *nominal, reference))
         if now.held.beats(best.held):
             best, chosen = now, (path, along) if ended else None
         if best.held.strictly >= ENOUGH:
@@ -97,7 +97,8 @@ def sampled_regulator(
         refinements(sim, *chosen, reference, action, most_rounds) if chosen else ()
     ):
         progress("refined path", number + 1, ROUNDS)
-        found = _gains(sim, clip, action, feet, path, along, reference, best.effort)
+        nominal = _followed(sim, clip, path, along)
+        found = _gains(clip, action, feet, *nominal, reference, best.effort)
         held = trial.held(found)
         least = most - AS_MANY if most < ENOUGH else max(ENOUGH, most - AS_MANY)
         if held.strictly >= least and (most >= POOR or held.to_end >= ends - AS_MANY):
@@ -185,8 +186,20 @@ def _with(linear: Linear, rows: Int[np.ndarray, " R"], sim: Simulation, path: Pa
     return whole
 
 
+def _followed(sim: Simulation, clip: Clip, path: Path, linear: Linear) -> tuple[Path, Linear]:
+    """Return the part of a path that is followed, and the system along it: of a motion that
+    repeats, the last cycle but one."""
+    if not clip.cyclic:
+        return path, linear
+    first = len(path) - 2 * clip.steps
+    rows = slice(first, first + clip.steps)
+    qpos = path.qpos[rows].copy()
+    qpos[:, :3] -= clip.at(np.array([first])).qpos[0, :3] - clip.at(np.array([0])).qpos[0, :3]
+    cycle = Path(qpos, path.qvel[rows], path.targets[rows])
+    return cycle, linearised(sim, cycle, following(cycle, clip))
+
+
 def _gains(
-    sim: Simulation,
     clip: Clip,
     action: np.ndarray,
     feet: Feet,
@@ -195,14 +208,7 @@ def _gains(
     reference: Path,
     effort: float,
 ) -> Gains:
-    """Return the regulator along a path; of a motion that repeats, along its last cycle but one."""
-    if clip.cyclic:
-        first = len(path) - 2 * clip.steps
-        rows = slice(first, first + clip.steps)
-        qpos = path.qpos[rows].copy()
-        qpos[:, :3] -= clip.at(np.array([first])).qpos[0, :3] - clip.at(np.array([0])).qpos[0, :3]
-        path = Path(qpos, path.qvel[rows], path.targets[rows])
-        linear = linearised(sim, path, following(path, clip))
+    """Return the regulator along a path at an effort."""
     law = riccati(linear, action, clip.cyclic, effort=effort)
     lead = path.targets - reference.targets[: len(path)]
     places = feet.places(path.qpos)

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from robojackson.geometry.rotations import heading
 from robojackson.rl.config.train_config import ResetConfig
 from robojackson.rl.sim.reference_clip import STRIDE, Clip
-from robojackson.robot.body_states import own_bodies
+from robojackson.robot.body_states import own_bodies, solid_geoms
 from robojackson.robot.model import Robot
 
 BIN_SECONDS, MOST_BINS = 0.25, 250
@@ -117,8 +117,7 @@ def default_standing_pose(robot: Robot) -> Float[np.ndarray, " nq"]:
     data = mujoco.MjData(model)
     data.qpos[7:] = robot.stand
     mujoco.mj_forward(model, data)
-    touches = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
-    solid = own_bodies(model)[model.geom_bodyid] & touches
+    solid = own_bodies(model)[model.geom_bodyid] & solid_geoms(model)
     heights = data.geom_xpos[:, 2]
     lowest = min(heights[i] - _reach_down(model, data, int(i)) for i in np.flatnonzero(solid))
     qpos = data.qpos.copy()

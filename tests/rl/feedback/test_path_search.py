@@ -151,6 +151,7 @@ def test_no_search_follows_one_that_holds_nearly_all(
 ) -> None:
     held = iter([0.0, 0.5, 0.95, 1.0])
     monkeypatch.setattr(sampled_regulator, "_searched", lambda *given: (*plain[1:], False))
+    monkeypatch.setattr(sampled_regulator, "_followed", lambda *given: given[-2:])
     monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
     assert found().held == 0.95
@@ -199,6 +200,7 @@ def test_a_long_motion_is_searched_again_only_while_little_is_held(
 
     monkeypatch.setattr(sampled_regulator, "TRIED_S", 0.0)
     monkeypatch.setattr(sampled_regulator, "_searched", searched)
+    monkeypatch.setattr(sampled_regulator, "_followed", lambda *given: given[-2:])
     monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: plain[0])
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
     assert found().held == max(shares[:searches])
@@ -222,6 +224,7 @@ def test_a_path_nearer_to_the_motion_is_taken_if_it_holds_about_as_many_robots(
     )
     for shares, taken in shares_taken:
         held, names = iter([0.1, *shares]), iter(["searched", "nearer", "nearest"])
+        monkeypatch.setattr(sampled_regulator, "_followed", lambda *given: given[-2:])
         monkeypatch.setattr(sampled_regulator, "_gains", lambda *given, names=names: next(names))
         monkeypatch.setattr(Trial, "held", lambda *given, held=held: Held(next(held), 1.0, 1.0))
         assert found() == taken
@@ -238,6 +241,7 @@ def test_a_path_nearer_to_the_motion_that_brings_none_to_the_end_is_not_taken(
     monkeypatch.setattr(sampled_regulator, "refinements", lambda *given: [plain[1:]])
     monkeypatch.setattr(sampled_regulator, "TRIES", 1)
     monkeypatch.setattr(sampled_regulator, "replace", lambda best, held: best)
+    monkeypatch.setattr(sampled_regulator, "_followed", lambda *given: given[-2:])
     monkeypatch.setattr(sampled_regulator, "_gains", lambda *given: next(names))
     monkeypatch.setattr(Trial, "held", lambda *given: next(held))
     assert found() == "searched"
