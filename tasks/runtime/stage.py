@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar, cast
 
 from robojackson.errors import StoreError
+from robojackson.robot.description import RobotDescription
 from storage import stage_records
 from storage.artifact import Artifact
 from storage.store import Store
@@ -216,8 +217,10 @@ def versions() -> dict[str, str]:
 
 
 def identity(value: Any) -> Any:
-    """Return what a value is, in JSON: artifacts by content, configurations by class and fields,
-    mappings in their order, which has a meaning in a robot's patterns and contacts.
+    """Return what a value is, in JSON: artifacts by content, configurations by class and fields.
+
+    The order of a mapping counts in a robot alone, whose patterns and contacts have one; Prefect's
+    database keeps none in the parameters of a run, so a configuration from there has another.
 
     Raises:
         TypeError: a value without a content, such as a path.
@@ -225,10 +228,12 @@ def identity(value: Any) -> Any:
     if isinstance(value, Artifact):
         return {"sha256": value.sha256}
     if is_dataclass(value) and not isinstance(value, type):
-        inner = {f.name: identity(getattr(value, f.name)) for f in fields(value) if f.compare}
-        return {"class": type(value).__qualname__, **inner}
+        inner = {f.name: getattr(value, f.name) for f in fields(value) if f.compare}
+        if isinstance(value, RobotDescription):
+            inner = {k: list(v.items()) if isinstance(v, Mapping) else v for k, v in inner.items()}
+        return {"class": type(value).__qualname__, **identity(inner)}
     if isinstance(value, Mapping):
-        return {"pairs": [[str(key), identity(inner)] for key, inner in value.items()]}
+        return {str(key): identity(inner) for key, inner in sorted(value.items())}
     if isinstance(value, list | tuple):
         return [identity(inner) for inner in value]
     if value is None or isinstance(value, str | int | float | bool):

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from robojackson.errors import UnknownName
 from robojackson.geometry.rotations import heading, quat_multiply
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.rl.config.paper_config import POINT_WEIGHTS
 from robojackson.rl.config.train_config import ControlConfig, PaperConfig
 from robojackson.rl.modes.mode import EpisodeStart, Score
 from robojackson.rl.modes.paper_reward import PaperState, has_fallen, miss, paper_terms, ramp
@@ -138,7 +139,10 @@ class PaperPoints:
     def __init__(self, robot: Robot, reference: ReferenceMotion, config: PaperConfig) -> None:
         sites, bodies = robot.keypoint_names, robot.body_names
         known = (*sites, *bodies)
-        weights = {k: w for k, w in config.weights.items() if k in known or k not in SPINE}
+        # In one order whoever names them: the order of a sum decides its last bits.
+        listed = (*POINT_WEIGHTS, *sorted({*config.weights} - {*POINT_WEIGHTS}))
+        counted = [k for k in listed if k in config.weights and (k in known or k not in SPINE)]
+        weights = {name: config.weights[name] for name in counted}
         for name in weights:
             if name not in known:
                 raise UnknownName("point", name, "paper.weights", known)

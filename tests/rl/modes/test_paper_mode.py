@@ -20,7 +20,7 @@ from robojackson.rl.config.train_config import PaperConfig, TrackConfig, TrainCo
 from robojackson.rl.env.tracking_core import TrackingCore
 from robojackson.rl.env.vec_env import TrackingEnv
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_reward
-from robojackson.rl.modes.paper_mode import facing_ahead
+from robojackson.rl.modes.paper_mode import PaperPoints, facing_ahead
 from robojackson.rl.modes.paper_reward import Miss, PaperState, has_fallen, miss, paper_terms, ramp
 from robojackson.rl.modes.standing_motion import make_standing_motion
 from robojackson.rl.sim.trainable import require_trainable
@@ -276,6 +276,17 @@ def test_a_robot_whose_spine_has_other_names_is_rewarded_without_it(
     answer = tuple("belly" if name == "lwaist" else name for name in sway.body_names)
     audit = audit_both_readings(other, dataclasses.replace(sway, body_names=answer), PaperConfig())
     assert audit["root"].of["statue"] < 1.0
+
+
+def test_the_order_in_which_points_are_weighed_changes_no_bit(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """PostgreSQL orders the weights of a run that a worker takes."""
+    usual = PaperConfig()
+    turned = PaperConfig(weights=dict(sorted(usual.weights.items())))
+    assert list(turned.weights) != list(usual.weights)
+    here, there = (PaperPoints(robot, sway, config).weights for config in (usual, turned))
+    np.testing.assert_array_equal(here, there)
 
 
 def test_a_point_without_a_body_is_refused(robot: Robot, sway: ReferenceMotion) -> None:

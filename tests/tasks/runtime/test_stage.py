@@ -2,17 +2,21 @@
 
 import asyncio
 import importlib
+import json
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from prefect import flow
+from pydantic import TypeAdapter
 
 from robojackson.mocap.recover import MocapConfig
 from robojackson.mocap.temporal.temporal_lift import TemporalConfig
+from robojackson.rl.config.paper_config import PaperConfig
 from robojackson.rl.config.train_config import TrainConfig
 from storage.artifact import Artifact
 from storage.store import Store
@@ -273,3 +277,19 @@ def test_the_place_of_an_artifact_is_not_part_of_the_key() -> None:
 def test_a_path_is_refused_as_an_input() -> None:
     with pytest.raises(TypeError, match="no content"):
         caching.identity({"clip": Path("a.mp4")})
+
+
+def test_a_configuration_from_the_database_has_the_key_that_it_was_sent_with() -> None:
+    """PostgreSQL's `jsonb` keeps the parameters of a run and orders their keys by itself."""
+    sent = TrainConfig(paper=PaperConfig())
+    plain = TypeAdapter(TrainConfig).dump_python(sent, mode="json")
+    taken = TypeAdapter(TrainConfig).validate_python(_by_length(plain))
+    assert list(taken.paper.weights) != list(sent.paper.weights)
+    assert json.dumps(caching.identity(taken)) == json.dumps(caching.identity(sent))
+
+
+def _by_length(value: Any) -> Any:
+    """Return a value with its keys as `jsonb` has them: shorter ones first."""
+    if not isinstance(value, dict):
+        return value
+    return {key: _by_length(value[key]) for key in sorted(value, key=lambda k: (len(k), k))}
