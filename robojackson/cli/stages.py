@@ -77,7 +77,7 @@ def mocap(
         "landmarks": str(out / "landmarks.parquet"),
         "frames": len(sequence),
         "fps": sequence.fps,
-        "detected": int(track.detected.sum()),
+        "detected": int(sequence.valid.sum()),
         "person": max(track.person, 1),
         "floor": mocap_card.floor_figures(sequence),
         "contact_share": mocap_card.contact_shares(sequence),

@@ -20,6 +20,7 @@ from robojackson.clips.video_container import (
     declared_rate,
     first_frame,
     frame_step,
+    length_s,
     opened,
     packet_times,
     pixel_aspect,
@@ -68,10 +69,10 @@ class VideoInfo:
     Attributes:
         path: The file.
         width, height: Size of the upright image, square pixels.
-        fps: Mean frames a second that are read.
+        fps: Mean frames a second that are read, pauses left out.
         uneven: Whether the frames are not evenly spaced, as a phone writes them.
         frames: Number of frames that are read.
-        duration_s: frames / fps, seconds.
+        duration_s: From the first frame to the end of the last, seconds.
         rotation: Clockwise degrees that turn a stored image upright: 0, 90, 180 or 270.
         step: Every `step`-th frame of the file is read; 1 below 90 frames a second.
     """
@@ -152,7 +153,8 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     stamps = stamps[::step]
     fps = rate(stamps, fps / step)
     frames = len(stamps)
-    info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps), step)
+    seconds = length_s(stamps, fps, path)
+    info = VideoInfo(path, *size, fps, frames, seconds, rotation, uneven(stamps, fps), step)
     require_within(info, limits)
     return info
 

@@ -1,0 +1,43 @@
+"""What `mocap` counts: the frames of the motion in which the person was seen, by any camera."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robojackson.cli import mocap_card, stages
+from robojackson.mocap.recover import MocapConfig, recover_motion
+from robojackson.motion.landmark_track import ARRAYS, LandmarkTrack
+
+ROOT = Path(__file__).parents[2]
+CLIP = ROOT / "clips" / "hip_shake.mp4"
+
+
+@pytest.fixture(scope="module")
+def hip_shake() -> LandmarkTrack:
+    """Return the 120 frames that MediaPipe found in the clip."""
+    with np.load(ROOT / "tests" / "golden" / "hip_shake_track.npz") as data:
+        size = float(data["fps"]), int(data["width"]), int(data["height"])
+        points = (data[name].astype(float) for name in ARRAYS)
+        return LandmarkTrack(*size, *points)
+
+
+def figures(
+    track: LandmarkTrack, valid: np.ndarray | None, out: Path, second: Path | None = None
+) -> dict:
+    """Return the figures of `mocap` for a track, with the frames that its motion was seen in."""
+    sequence = recover_motion(track, MocapConfig())
+    if valid is not None:
+        sequence = replace(sequence, valid=valid)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stages, "_track_of", lambda *_: track)
+        patch.setattr(stages, "_motion_of", lambda *_: sequence)
+        return stages.mocap(CLIP, out, "base", {}, second=second)
+
+
+def test_a_motion_with_a_pause_is_not_whole(hip_shake: LandmarkTrack, tmp_path: Path) -> None:
+    times = np.arange(120) / 30.0 + np.where(np.arange(120) < 60, 0.0, 2.5)
+    answer = figures(replace(hip_shake, time_s=times), None, tmp_path)
+    assert (answer["frames"], answer["detected"]) == (195, 120)
+    assert mocap_card.mocap_verdict(answer)["kind"] == "poor"
