@@ -73,7 +73,8 @@ class VideoInfo:
         uneven: Whether the frames are not evenly spaced, as a phone writes them.
         frames: Number of frames that are read.
         duration_s: From the first frame to the end of the last, seconds.
-        rotation: Clockwise degrees that turn a stored image upright: 0, 90, 180 or 270.
+        rotation: Clockwise degrees that turn a stored image upright, a mirrored one after it was
+            flipped upside down: 0, 90, 180 or 270.
         step: Every `step`-th frame of the file is read; 1 below 90 frames a second.
     """
 
