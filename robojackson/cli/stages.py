@@ -21,12 +21,15 @@ from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
     from robojackson.api.motions import LoadedNetworks
+    from robojackson.clips.quality.advice import Kind
     from robojackson.motion.landmark_track import LandmarkTrack
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
 """Options advised for the next training of a robot that does not dance."""
+ALONE: "Kind" = "person_missing"
+"""Advice about one camera alone: where another one sees the person, none is missing."""
 Figures = dict[str, Any]
 Overrides = Mapping[str, Any]
 
@@ -82,7 +85,11 @@ def mocap(
         "floor": mocap_card.floor_figures(sequence),
         "contact_share": mocap_card.contact_shares(sequence),
         "notes": list(sequence.notes),
-        "advice": [each.record for each in advise(track, start_s or 0.0)],
+        "advice": [
+            each.record
+            for each in advise(track, start_s or 0.0)
+            if second is None or each.kind != ALONE
+        ],
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }

@@ -41,3 +41,15 @@ def test_a_motion_with_a_pause_is_not_whole(hip_shake: LandmarkTrack, tmp_path: 
     answer = figures(replace(hip_shake, time_s=times), None, tmp_path)
     assert (answer["frames"], answer["detected"]) == (195, 120)
     assert mocap_card.mocap_verdict(answer)["kind"] == "poor"
+
+
+@pytest.mark.parametrize(("second", "kind"), [(None, "poor"), (CLIP, "whole")])
+def test_who_is_hidden_from_the_first_camera_is_seen_by_the_second(
+    hip_shake: LandmarkTrack, tmp_path: Path, second: Path | None, kind: str
+) -> None:
+    points = hip_shake.landmarks.copy()
+    points[30:90] = np.nan
+    track, valid = replace(hip_shake, landmarks=points), np.ones(120, bool)
+    answer = figures(track, valid if second else None, tmp_path, second)
+    assert mocap_card.mocap_verdict(answer)["kind"] == kind
+    assert ("person_missing" in {each["kind"] for each in answer["advice"]}) == (second is None)
