@@ -7,6 +7,7 @@ command's answer. Heavy libraries are imported inside.
 import json
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,7 +64,7 @@ def mocap(
         raise BadConfiguration("two cameras exclude --hypotheses and --hybrik: omit these options")
     networks = load_weights(settings.network)
     with results_in(out) as files:
-        track = _track_of(video, settings)
+        track = _track_of(video, settings, start_s or 0.0)
         sequence = _motion_of(track, video, second, settings, networks)
         motions = {"smpl.parquet": sequence.to_bytes()}
         for name, other in sample_hypotheses(track, settings, hypotheses):
@@ -95,11 +96,12 @@ def mocap(
     }
 
 
-def _track_of(video: Path, settings: "PipelineConfig") -> "LandmarkTrack":
-    """Return the landmarks of a video, found in a process of its own."""
+def _track_of(video: Path, settings: "PipelineConfig", begin_s: float = 0.0) -> "LandmarkTrack":
+    """Return the landmarks of a video that begins at a moment of the one that was given, found in a
+    process of its own."""
     from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
 
-    info = probed(video, settings.video)
+    info = replace(probed(video, settings.video), begin_s=begin_s)
     with console.bar(f"landmarks of {video.name}") as progress:
         return in_video_process(
             detect_landmarks, video, info, settings.detector, settings.dancer,

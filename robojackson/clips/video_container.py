@@ -54,6 +54,8 @@ ANALYSED = 60.0
 """Frames a second that are read, about: of a faster file every second frame, or third, or so on."""
 RATE_TOLERANCE = 0.002
 """A declared rate that differs from the timestamps by more is ignored."""
+MISSING_FRAMES_ALLOWED = 2
+"""Frames that an index may promise beyond those in the file: some writers count one too many."""
 PAUSE_S, PAUSE = 0.5, 2.5
 """Two pictures further apart than both, seconds and usual steps, have a pause between them."""
 
@@ -166,6 +168,16 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
         raise UnreadableVideo(f"more than {MOST_FRAMES:,} frames; trim it", path)
     stamps = np.sort(np.array(found))
     return stamps - stamps[:1] if len(stamps) else stamps
+
+
+def require_complete(path: Path, frames: int, promised: int) -> None:
+    """Raise `TruncatedVideo` where a file holds fewer frames than its index promises."""
+    if frames + MISSING_FRAMES_ALLOWED < promised:
+        raise TruncatedVideo(
+            f"holds {frames} of the {promised} frames that its index promises; "
+            "copy or download the file again",
+            path,
+        )
 
 
 def _on_one_clock(packets: Iterable[Packet], path: Path) -> Iterator[Packet]:

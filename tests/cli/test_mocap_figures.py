@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from robojackson.cli import mocap_card, stages
+from robojackson.clips.video import VideoInfo
 from robojackson.mocap.recover import MocapConfig, recover_motion
 from robojackson.motion.landmark_track import ARRAYS, LandmarkTrack
 
@@ -53,3 +54,17 @@ def test_who_is_hidden_from_the_first_camera_is_seen_by_the_second(
     answer = figures(track, valid if second else None, tmp_path, second)
     assert mocap_card.mocap_verdict(answer)["kind"] == kind
     assert ("person_missing" in {each["kind"] for each in answer["advice"]}) == (second is None)
+
+
+def test_the_landmarks_of_a_range_know_where_it_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Read(Exception):  # noqa: N818
+        """Ends the stage where the video was read."""
+
+    def read(_work: object, _path: Path, info: VideoInfo, *_: object, **__: object) -> None:
+        raise Read(info.begin_s)
+
+    monkeypatch.setattr(stages, "in_video_process", read)
+    with pytest.raises(Read, match=r"1\.2"):
+        stages.mocap(CLIP, tmp_path, "base", {}, start_s=1.2)
