@@ -59,7 +59,7 @@ def test_who_is_hidden_from_the_first_camera_is_seen_by_the_second(
 def test_the_landmarks_of_a_range_know_where_it_begins(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Read(Exception):  # noqa: N818
+    class Read(Exception):
         """Ends the stage where the video was read."""
 
     def read(_work: object, _path: Path, info: VideoInfo, *_: object, **__: object) -> None:
