@@ -51,6 +51,35 @@ def test_no_joint_turns_the_long_way_round_between_two_frames() -> None:
     assert (turned * Rotation.from_rotvec(spun).inv()).magnitude().max() < 1e-5
 
 
+def z_up(text: str) -> str:
+    """Return a BVH of ours with z up, as Blender writes it back: (x, y, z) -> (x, -z, y)."""
+    turn, lines = Rotation.from_euler("x", 90.0, degrees=True), []
+    head, _, table = text.partition("Frame Time:")
+    for line in head.splitlines():
+        key, _, numbers = line.partition("OFFSET ")
+        offset = turn.apply(np.array(numbers.split(), float)) if numbers else None
+        lines.append(line if offset is None else f"{key}OFFSET {' '.join(map(str, offset))}")
+    period, *rows = table.splitlines()
+    lines[-1] += f"\nFrame Time:{period}" if lines[-1] else f"Frame Time:{period}"
+    for row in rows:
+        numbers = np.array(row.split(), float)
+        local = Rotation.from_euler("ZXY", numbers[3:].reshape(-1, 3), degrees=True)
+        angles = (turn * local * turn.inv()).as_euler("ZXY", degrees=True)
+        places = turn.apply(numbers[:3])
+        lines.append(" ".join(map(str, [*places, *angles.ravel()])))
+    return "\n".join(lines)
+
+
+def test_a_skeleton_of_smpl_whose_rest_pose_has_z_up_is_turned_to_smpls_axes() -> None:
+    sequence = person()
+    found = replace(bvh.read(z_up(bvh.write(sequence).decode()).encode()), to_world=np.eye(3))
+    np.testing.assert_allclose(found.rest_joints, sequence.rest_joints, atol=1e-5)
+    back = ground_foreign_motion(found, sequence.fps)
+    np.testing.assert_allclose(back.body_pose, sequence.body_pose, atol=1e-5)
+    quarter = Rotation.from_euler("z", -90.0, degrees=True)
+    np.testing.assert_allclose(quarter.apply(sequence.joints[9]), back.joints[9], atol=1e-4)
+
+
 STICK = """HIERARCHY
 ROOT Hips
 {
