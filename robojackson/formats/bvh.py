@@ -163,7 +163,7 @@ def _require_parent(node: Node, names: list[str], index: int) -> None:
 
 def _other(tree: Tree) -> ForeignMotion:
     """Return the motion of any other skeleton, solved from the positions of its joints."""
-    points = keypoints_of(tree)
+    points, invented = keypoints_of(tree)
     lengths = np.zeros(len(PARENTS))
     for index, parent in enumerate(PARENTS[1:], start=1):
         lengths[index] = np.median(np.linalg.norm(points[:, index] - points[:, parent], axis=-1))
@@ -172,7 +172,7 @@ def _other(tree: Tree) -> ForeignMotion:
     metre, notes = _unit(rest)
     points, rest = points * metre, rest * metre
     points, faults = mended(points, tree.fps)
-    notes = (*notes, *faults)
+    notes = (*invented, *notes, *faults)
     if len(points) > 1:
         points, angles = with_flat_soles(points, tree.fps)
         if (turned := np.degrees(angles).round()).any():
