@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from av.sidedata.sidedata import SideData
 from av.video.frame import VideoFrame
 from jaxtyping import UInt8
 
@@ -49,7 +50,7 @@ def mirrored(frame: VideoFrame) -> bool:
     a mirror from the sign of its determinant.
     """
     tag = frame.side_data.get("DISPLAYMATRIX")
-    if tag is None:
+    if not isinstance(tag, SideData):
         return False
     a, b, _, c, d = np.frombuffer(bytes(tag), np.int32, 5).tolist()
     return bool(a * d - b * c < 0)
