@@ -45,7 +45,7 @@ def probe_video(
     with store.scratch() as folder:
         target = folder / f"{source.path.stem}.mp4"
         in_video_process(trim, source.path, begin, end, target, frames=whole.frames)
-        return _save(store, target, probed(target, limits))
+        return _save(store, target, replace(probed(target, limits), begin_s=begin))
 
 
 def info_of(store: Store, info: Artifact, path: Path) -> VideoInfo:

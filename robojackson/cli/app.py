@@ -93,18 +93,18 @@ def mocap(
     as_json: Json = False,
 ) -> CommandResult:
     """Recover the motion of the person in a video: smpl.parquet, landmarks, a picture."""
-    from robojackson.cli import cards, mocap_card, stages
+    from robojackson.cli import cards, mocap_card, stages, video_range
     from robojackson.cli.pictures.mocap_pictures import draw_mocap
     from robojackson.cli.pictures.people_listing import list_people
-    from robojackson.cli.video_range import video_range
 
     log_to_stderr()
     brought = {"network.hybrik": yaml_text(hybrik), "network.niki": yaml_text(niki)}
     overrides = overrides_from(set_, {**brought, "dancer.number": person, "detector": quality})
-    with video_range(video, second, out, (start, end), config, overrides) as clip:
-        if people:
-            data, lines = list_people(clip, out, config, overrides, start)
-            return CommandResult(data, text=lines)
+    if people:
+        others = {"a second clip": second, "--hypotheses": hypotheses, "--video": film}
+        data, lines = list_people(video, out, (start, end), config, overrides, others)
+        return CommandResult(data, text=lines)
+    with video_range.video_range(video, second, out, (start, end), config, overrides) as clip:
         made = stages.mocap(clip, out, config, overrides, hypotheses, second, start, video)
         made = mocap_card.with_verdict(made | draw_mocap(clip, out, config, overrides, film, start))
     return CommandResult(made, text=cards.shown(made, mocap_card.mocap_lines(made), verbose))

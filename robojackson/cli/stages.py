@@ -7,6 +7,7 @@ command's answer. Heavy libraries are imported inside.
 import json
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,12 +22,15 @@ from robojackson.rl.evaluation.verdict import NEEDS_FULL_LENGTH
 
 if TYPE_CHECKING:
     from robojackson.api.motions import LoadedNetworks
+    from robojackson.clips.quality.advice import Kind
     from robojackson.motion.landmark_track import LandmarkTrack
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
 """Options advised for the next training of a robot that does not dance."""
+ALONE: "Kind" = "person_missing"
+"""Advice about one camera alone: where another one sees the person, none is missing."""
 Figures = dict[str, Any]
 Overrides = Mapping[str, Any]
 
@@ -60,7 +64,7 @@ def mocap(
         raise BadConfiguration("two cameras exclude --hypotheses and --hybrik: omit these options")
     networks = load_weights(settings.network)
     with results_in(out) as files:
-        track = _track_of(video, settings)
+        track = _track_of(video, settings, start_s or 0.0)
         sequence = _motion_of(track, video, second, settings, networks)
         motions = {"smpl.parquet": sequence.to_bytes()}
         for name, other in sample_hypotheses(track, settings, hypotheses):
@@ -77,22 +81,27 @@ def mocap(
         "landmarks": str(out / "landmarks.parquet"),
         "frames": len(sequence),
         "fps": sequence.fps,
-        "detected": int(track.detected.sum()),
+        "detected": int(sequence.valid.sum()),
         "person": max(track.person, 1),
         "floor": mocap_card.floor_figures(sequence),
         "contact_share": mocap_card.contact_shares(sequence),
         "notes": list(sequence.notes),
-        "advice": [each.record for each in advise(track, start_s or 0.0)],
+        "advice": [
+            each.record
+            for each in advise(track, start_s or 0.0)
+            if second is None or each.kind != ALONE
+        ],
         "next": cards.command_line("retarget", out / "smpl.parquet", "-o", out),
         "seconds": time.monotonic() - began,
     }
 
 
-def _track_of(video: Path, settings: "PipelineConfig") -> "LandmarkTrack":
-    """Return the landmarks of a video, found in a process of its own."""
+def _track_of(video: Path, settings: "PipelineConfig", begin_s: float = 0.0) -> "LandmarkTrack":
+    """Return the landmarks of a video that begins at a moment of the one that was given, found in a
+    process of its own."""
     from robojackson.mocap.landmarks.landmark_pipeline import detect_landmarks
 
-    info = probed(video, settings.video)
+    info = replace(probed(video, settings.video), begin_s=begin_s)
     with console.bar(f"landmarks of {video.name}") as progress:
         return in_video_process(
             detect_landmarks, video, info, settings.detector, settings.dancer,

@@ -23,12 +23,14 @@ def video_range(
     range_s: tuple[float | None, float | None],
     config: str,
     overrides: Mapping[str, Any],
+    kept: bool = True,
 ) -> Iterator[Path]:
     """Yield the video, or the file of its range in `out`, which goes again if the block fails.
 
     Args:
         second: Another camera; two videos have no common range before they are synchronised.
         range_s: First and last moment, seconds; None is the video's.
+        kept: Whether the file stays for the results, which are about it.
     Raises:
         BadConfiguration: nothing is in the range, or there are two cameras.
         RoboJacksonError: the video cannot be read.
@@ -49,6 +51,8 @@ def video_range(
     try:
         in_video_process(trim, video, begin, end, target, frames=whole.frames)
         yield target
+        if made and not kept:
+            target.unlink(missing_ok=True)
     except BaseException:
         if made:  # not that of an earlier run, whose results are about it
             target.unlink(missing_ok=True)

@@ -107,7 +107,7 @@ def track_of(
     if info.step > 1:
         notes = (*notes, f"of {info.fps * info.step:.0f} frames a second {info.fps:.0f} are read")
     if info.uneven:
-        notes = (*notes, "the frame rate varies: the motion is resampled to its mean")
+        notes = (*notes, f"the frame rate varies: the motion has {info.fps:.4g} a second")
     return LandmarkTrack(
         fps=info.fps,
         width=info.width,

@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from av.sidedata.sidedata import SideData
 from av.video.frame import VideoFrame
 from jaxtyping import UInt8
 
@@ -18,7 +19,7 @@ NEARLY = 1.1
 def upright(
     frame: VideoFrame, short_side: int | None, aspect: float = 1.0
 ) -> UInt8[np.ndarray, "H W 3"]:
-    """Return the pixels of a frame, made square, its rotation tag applied.
+    """Return the pixels of a frame, made square, mirrored and turned as its display matrix says.
 
     Args:
         frame: A decoded frame.
@@ -36,8 +37,23 @@ def upright(
         image = _pixels(frame.reformat(width, height, format="rgb24", interpolation="AREA"))
     else:
         image = _pixels(frame.reformat(format="rgb24"))
+    if mirrored(frame):
+        image = cv2.flip(image, 0)
     turn = TURNS.get(round(frame.rotation / 90) % 4)
     return image if turn is None else cv2.rotate(image, turn)
+
+
+def mirrored(frame: VideoFrame) -> bool:
+    """Return whether a frame is shown mirrored: upside down first, then turned by its rotation.
+
+    The rotation is read from the first column of the display matrix (FFmpeg's nine 16.16 numbers),
+    a mirror from the sign of its determinant.
+    """
+    tag = frame.side_data.get("DISPLAYMATRIX")
+    if not isinstance(tag, SideData):
+        return False
+    a, b, _, c, d = np.frombuffer(bytes(tag), np.int32, 5).tolist()
+    return bool(a * d - b * c < 0)
 
 
 def _pixels(frame: VideoFrame) -> UInt8[np.ndarray, "H W 3"]:

@@ -20,10 +20,12 @@ from robojackson.clips.video_container import (
     declared_rate,
     first_frame,
     frame_step,
+    length_s,
     opened,
     packet_times,
     pixel_aspect,
     rate,
+    require_complete,
     video_stream,
 )
 from robojackson.config import config_dataclass
@@ -39,8 +41,6 @@ from robojackson.motion.landmark_track import uneven
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".gif")
 TIME_TOLERANCE_S = 1e-6
-MISSING_FRAMES_ALLOWED = 2
-"""Frames that an index may promise beyond those in the file: some writers count one too many."""
 DAMAGE_ALLOWED = 0.2
 """Share of the frames that may be damaged; they are left out."""
 WITHOUT_DISPLAY_TIMES = "avi"
@@ -68,12 +68,14 @@ class VideoInfo:
     Attributes:
         path: The file.
         width, height: Size of the upright image, square pixels.
-        fps: Mean frames a second that are read.
+        fps: Mean frames a second that are read, pauses left out.
         uneven: Whether the frames are not evenly spaced, as a phone writes them.
         frames: Number of frames that are read.
-        duration_s: frames / fps, seconds.
-        rotation: Clockwise degrees that turn a stored image upright: 0, 90, 180 or 270.
+        duration_s: From the first frame to the end of the last, seconds.
+        rotation: Clockwise degrees that turn a stored image upright, a mirrored one after it was
+            flipped upside down: 0, 90, 180 or 270.
         step: Every `step`-th frame of the file is read; 1 below 90 frames a second.
+        begin_s: Where it begins in the video that was given, of which it is a range, seconds.
     """
 
     path: Path
@@ -85,6 +87,7 @@ class VideoInfo:
     rotation: int
     uneven: bool = False
     step: int = 1
+    begin_s: float = 0.0
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the figures as JSON.
@@ -131,7 +134,7 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
         declared, aspect = declared_rate(stream), pixel_aspect(stream)
         promised = stream.frames
     stamps = packet_times(path)
-    _require_complete(path, len(stamps), promised)
+    require_complete(path, len(stamps), promised)
     with opened(path) as container:
         first = first_frame(container, path)
     if len(stamps) > 1 and stamps[-1] == 0.0:
@@ -152,7 +155,8 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     stamps = stamps[::step]
     fps = rate(stamps, fps / step)
     frames = len(stamps)
-    info = VideoInfo(path, *size, fps, frames, frames / fps, rotation, uneven(stamps, fps), step)
+    seconds = length_s(stamps, fps, path)
+    info = VideoInfo(path, *size, fps, frames, seconds, rotation, uneven(stamps, fps), step)
     require_within(info, limits)
     return info
 
@@ -221,15 +225,6 @@ def _decoded(path: Path) -> Iterator[tuple[float, VideoFrame, float]]:
                     time_s = float(stamps[min(good + bad, len(stamps)) - 1])
                 if (good - 1) % step == 0:
                     yield time_s, frame, aspect
-
-
-def _require_complete(path: Path, frames: int, promised: int) -> None:
-    if frames + MISSING_FRAMES_ALLOWED < promised:
-        raise TruncatedVideo(
-            f"holds {frames} of the {promised} frames that its index promises; "
-            "copy or download the file again",
-            path,
-        )
 
 
 def require_within(info: VideoInfo, limits: VideoLimits) -> None:

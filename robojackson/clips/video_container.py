@@ -19,6 +19,7 @@ from jaxtyping import Float
 
 from robojackson.errors import TruncatedVideo, UnreadableVideo
 from robojackson.files.file_kinds import TABLE, kind_of
+from robojackson.motion.landmark_track import uneven
 
 Packet: TypeAlias = "av.Packet[VideoStream]"
 
@@ -53,6 +54,10 @@ ANALYSED = 60.0
 """Frames a second that are read, about: of a faster file every second frame, or third, or so on."""
 RATE_TOLERANCE = 0.002
 """A declared rate that differs from the timestamps by more is ignored."""
+MISSING_FRAMES_ALLOWED = 2
+"""Frames that an index may promise beyond those in the file: some writers count one too many."""
+PAUSE_S, PAUSE = 0.5, 2.5
+"""Two pictures further apart than both, seconds and usual steps, have a pause between them."""
 
 
 def opened(path: Path, sounds: bool = False) -> av.container.InputContainer:
@@ -165,6 +170,16 @@ def packet_times(path: Path) -> Float[np.ndarray, " T"]:
     return stamps - stamps[:1] if len(stamps) else stamps
 
 
+def require_complete(path: Path, frames: int, promised: int) -> None:
+    """Raise `TruncatedVideo` where a file holds fewer frames than its index promises."""
+    if frames + MISSING_FRAMES_ALLOWED < promised:
+        raise TruncatedVideo(
+            f"holds {frames} of the {promised} frames that its index promises; "
+            "copy or download the file again",
+            path,
+        )
+
+
 def _on_one_clock(packets: Iterable[Packet], path: Path) -> Iterator[Packet]:
     """Yield packets; raise `UnreadableVideo` where their clock starts again."""
     last_s = -np.inf
@@ -187,12 +202,38 @@ def declared_rate(stream: VideoStream) -> float:
 
 
 def rate(stamps: np.ndarray, stated: float) -> float:
-    """Return frames a second: the declared rate, unless the timestamps contradict it."""
+    """Return frames a second: the declared rate, unless the timestamps contradict it.
+
+    Their mean step counts, without pauses: a camera that waits does not thin the rest.
+    """
     span_s = stamps[-1] if len(stamps) > 1 else 0.0
     if not span_s > 0.0:
         return stated
-    measured = float((len(stamps) - 1) / span_s)
+    steps = np.diff(stamps)
+    pauses = steps[steps > max(PAUSE_S, PAUSE * float(np.median(steps)))]
+    if span_s - pauses.sum() <= 0.0:
+        pauses = pauses[:0]
+    measured = float((len(steps) - len(pauses)) / (span_s - pauses.sum()))
     return stated if abs(stated / measured - 1.0) <= RATE_TOLERANCE else measured
+
+
+def length_s(stamps: np.ndarray, fps: float, path: Path) -> float:
+    """Return the seconds from the first frame to the end of the last.
+
+    Raises:
+        UnreadableVideo: it pauses for so long that its motion would have too many frames.
+    """
+    if not uneven(stamps, fps):
+        return len(stamps) / fps
+    seconds = float(stamps[-1]) + 1.0 / fps
+    if seconds * fps > MOST_FRAMES:
+        raise UnreadableVideo(
+            f"{len(stamps)} frames in {seconds:.0f} s: its motion at {fps:.4g} a second would have "
+            f"more than {MOST_FRAMES:,}; write the part without pauses alone (ffmpeg -ss START "
+            "-i IN -t SECONDS OUT.mp4)",
+            path,
+        )
+    return seconds
 
 
 def frame_step(fps: float) -> int:

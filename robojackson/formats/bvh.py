@@ -116,26 +116,40 @@ def read(data: bytes) -> ForeignMotion:
 
 
 def _own(tree: Tree, names: list[str]) -> ForeignMotion:
-    """Return the motion of a skeleton with SMPL's joints."""
+    """Return the motion of a skeleton with SMPL's joints, whose rest pose is turned to SMPL's axes:
+    Blender's has z up."""
     nodes = [names.index(name) for name in JOINT_NAMES]
     offsets = np.array(REST_OFFSETS)
+    given = np.zeros((len(nodes), 3))
     for index, at in enumerate(nodes):
         _require_parent(tree.nodes[at], names, index)
-        offsets[index] = tree.nodes[at].offset
+        given[index] = tree.nodes[at].offset
+    given[0] = 0.0
+    turn = _to_rest_axes(given)
+    offsets[: len(nodes)] = given @ turn.T
     for parent, tip in _ENDS.items():
         if (end := f"{JOINT_NAMES[parent]}_end") in names:
-            offsets[tip] = tree.nodes[names.index(end)].offset
-    offsets[0] = 0.0
+            offsets[tip] = tree.nodes[names.index(end)].offset @ turn.T
     rest = assemble(offsets)
     metre, notes = _unit(rest, ours=True)
+    rotations = tree.rotations()[:, nodes] @ turn.T
+    rotations[:, 1:] = turn @ rotations[:, 1:]  # the root's goes to the axes of the file
     return ForeignMotion(
         fps=tree.fps,
-        rotations=tree.rotations()[:, nodes],
+        rotations=rotations,
         pelvis=tree.root() * metre,
         rest_joints=rest * metre,
         to_world=Y_UP_TO_WORLD.copy(),
         notes=notes,
     )
+
+
+def _to_rest_axes(offsets: Float[np.ndarray, "24 3"]) -> Float[np.ndarray, "3 3"]:
+    """Return the turn, by quarters, that takes bones of a rest pose nearest to SMPL's."""
+    turns = Rotation.create_group("O").as_matrix().round()
+    near = np.einsum("gij,nj,ni->g", turns, offsets, REST_OFFSETS[: len(offsets)])
+    nearest: np.ndarray = turns[near.argmax()]
+    return nearest
 
 
 def _require_parent(node: Node, names: list[str], index: int) -> None:
@@ -149,7 +163,7 @@ def _require_parent(node: Node, names: list[str], index: int) -> None:
 
 def _other(tree: Tree) -> ForeignMotion:
     """Return the motion of any other skeleton, solved from the positions of its joints."""
-    points = keypoints_of(tree)
+    points, invented = keypoints_of(tree)
     lengths = np.zeros(len(PARENTS))
     for index, parent in enumerate(PARENTS[1:], start=1):
         lengths[index] = np.median(np.linalg.norm(points[:, index] - points[:, parent], axis=-1))
@@ -158,7 +172,7 @@ def _other(tree: Tree) -> ForeignMotion:
     metre, notes = _unit(rest)
     points, rest = points * metre, rest * metre
     points, faults = mended(points, tree.fps)
-    notes = (*notes, *faults)
+    notes = (*invented, *notes, *faults)
     if len(points) > 1:
         points, angles = with_flat_soles(points, tree.fps)
         if (turned := np.degrees(angles).round()).any():

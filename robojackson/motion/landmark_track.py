@@ -41,7 +41,7 @@ class LandmarkTrack(TableFile):
     """BlazePose landmarks of one person through a clip.
 
     Attributes:
-        fps: Frames a second of the clip, the mean where they are not evenly spaced.
+        fps: Frames a second of the clip, the mean without pauses where they are not evenly spaced.
         width, height: Size of the upright image, pixels.
         landmarks: Image coordinates divided by width and height, z in the scale of x.
         world_landmarks: Metres, origin between the hips, x right, y down, z away from the camera.

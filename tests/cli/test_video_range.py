@@ -1,5 +1,6 @@
 """A range of a video is looked at alone; an impossible one leaves nothing."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -54,6 +55,35 @@ def test_what_fails_keeps_the_range_of_an_earlier_run(tmp_path: Path) -> None:
     ):
         raise KeyboardInterrupt
     assert probe(shown, VideoLimits()).duration_s == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.medium
+def test_a_list_of_people_leaves_no_range(tmp_path: Path) -> None:
+    """The figures are of the video that was given, at its moments."""
+    words = ["mocap", str(CLIP), "-o", str(tmp_path), "--people", "--start", "0.4", "--end", "0.8"]
+    found = CliRunner().invoke(app, [*words, "--json"])
+    assert found.exit_code == 0, found.output
+    assert [path.name for path in tmp_path.iterdir()] == ["people.png"]
+    data = json.loads(found.stdout)
+    assert data["video"] == str(CLIP)
+    assert data["people"][0]["from_s"] == pytest.approx(0.4, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        ([str(CLIP)], "a second clip"),
+        (["--hypotheses", "2", "--video"], "--hypotheses and --video"),
+    ],
+)
+def test_a_list_of_people_refuses_what_it_would_leave_out(
+    tmp_path: Path, more: list[str], named: str
+) -> None:
+    out = tmp_path / "out"
+    found = CliRunner().invoke(app, ["mocap", str(CLIP), *more, "-o", str(out), "--people"])
+    assert found.exit_code == 1
+    assert f"--people only lists the people: omit {named}" in " ".join(found.output.split())
+    assert not out.exists()
 
 
 @pytest.mark.medium

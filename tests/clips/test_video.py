@@ -29,14 +29,16 @@ from tests.fixtures.bad_clips import damage, write_timed
 
 CLIPS = Path(__file__).parents[2] / "clips"
 LIMITS = VideoLimits()
-QUARTER_TURN_CLOCKWISE = (0, 1 << 16, 0, -(1 << 16), 0, 0)
+ONE = 1 << 16
+"""In the 16.16 numbers of a track header's matrix."""
+QUARTER_TURN_CLOCKWISE = (0, ONE, 0, -ONE, 0, 0)
 
 
-def turn_by_metadata(path: Path) -> None:
+def turn_by_metadata(path: Path, matrix: tuple[int, ...] = QUARTER_TURN_CLOCKWISE) -> None:
     """Write a quarter turn clockwise into the track header's matrix, as a phone does."""
     data = bytearray(path.read_bytes())
     start = data.index(b"tkhd") + 4 + 40
-    for index, value in enumerate(QUARTER_TURN_CLOCKWISE):
+    for index, value in enumerate(matrix):
         data[start + 4 * index : start + 4 * index + 4] = value.to_bytes(4, "big", signed=True)
     path.write_bytes(bytes(data))
 
@@ -128,6 +130,25 @@ def test_rotation_tag_turns_the_bright_left_half_up(write_video) -> None:
     image = next(read_frames(path)).astype(int)
     assert image.shape == (64, 48, 3)
     assert image[:30].mean() > image[34:].mean() + 40
+
+
+@pytest.mark.parametrize("flipped", ["x", "y", "xy", ""])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_a_picture_is_mirrored_and_turned_as_players_show_it(
+    tmp_path: Path, flipped: str, transposed: bool
+) -> None:
+    """The matrix takes stored pixels (x, y) to (a x + c y, b x + d y), then to positive ones."""
+    path, corner = tmp_path / "mirrored.mp4", np.zeros((48, 64, 3), np.uint8)
+    corner[:16, :24] = 200
+    write_timed(path, [(0.0, corner), (0.1, corner)])
+    image = next(read_frames(path))
+    x, y = (-ONE if axis in flipped else ONE for axis in "xy")
+    turn_by_metadata(path, (0, y, 0, x, 0, 0) if transposed else (x, 0, 0, 0, y, 0))
+    shown = image.transpose(1, 0, 2) if transposed else image
+    shown = shown[:: -1 if "y" in flipped else 1, :: -1 if "x" in flipped else 1]
+    info, read = probe(path, LIMITS), next(read_frames(path))
+    assert (info.width, info.height) == read.shape[1::-1]
+    assert np.array_equal(read, shown)
 
 
 def test_text_file_named_mp4_is_not_a_video(tmp_path: Path) -> None:

@@ -8,7 +8,9 @@ import pytest
 
 from robojackson.clips.trim import trim
 from robojackson.clips.video import VideoLimits, probe, read_frames, timed_frames
+from robojackson.clips.video_container import length_s, rate
 from robojackson.errors import UnreadableVideo
+from tests.fixtures.bad_clips import write_timed
 from tests.fixtures.web_streams import noise_piece
 
 FPS, FRAMES = 30, 40
@@ -93,3 +95,30 @@ def test_a_stream_whose_clock_starts_again_is_refused(tmp_path: Path) -> None:
     path.write_bytes(noise_in_pieces([0, 5, 0]))
     with pytest.raises(UnreadableVideo, match=r"starts again after .* several videos"):
         probe(path, VideoLimits())
+
+
+def paused(after: int, seconds: float, frames: int = 77, fps: float = 30.0) -> np.ndarray:
+    """Return timestamps with a pause before one frame."""
+    return np.arange(frames) / fps + np.where(np.arange(frames) < after, 0.0, seconds)
+
+
+@pytest.mark.parametrize("seconds", [2.5, 20.0])
+def test_a_pause_does_not_thin_what_was_filmed_around_it(tmp_path: Path, seconds: float) -> None:
+    path, times = tmp_path / "paused.mp4", paused(40, seconds)
+    write_timed(path, ((t, np.full((48, 64, 3), 3 * k, np.uint8)) for k, t in enumerate(times)))
+    found = probe(path, VideoLimits())
+    assert (found.frames, found.fps, found.uneven) == (77, pytest.approx(30.0, rel=1e-3), True)
+    assert found.duration_s == pytest.approx(77 / 30 + seconds, abs=1e-3)
+
+
+def test_the_rate_of_frames_that_vary_without_a_pause_is_their_mean() -> None:
+    times = np.cumsum(np.random.default_rng(0).choice([0.033, 0.034, 0.067, 0.1], 200))
+    times -= times[0]
+    assert rate(times, 60.0) == pytest.approx(199 / times[-1])
+
+
+def test_a_video_whose_pauses_would_fill_millions_of_frames_is_refused() -> None:
+    long = paused(40, 10 * 3600.0)
+    assert rate(long, 0.0) == pytest.approx(30.0)
+    with pytest.raises(UnreadableVideo, match="77 frames in 36003 s"):
+        length_s(long, 30.0, Path("night.mp4"))

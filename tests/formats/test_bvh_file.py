@@ -9,10 +9,11 @@ import pybvh
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robojackson.body.skeleton import JOINT_NAMES, keypoint
+from robojackson.body.skeleton import JOINT_NAMES, REST_JOINTS, REST_OFFSETS, keypoint
 from robojackson.errors import BadTable
 from robojackson.formats import bvh
 from robojackson.formats.containers import bvh_tree
+from robojackson.formats.containers.bvh_names import keypoints_of
 from robojackson.formats.foreign_motion import Y_UP_TO_WORLD
 from robojackson.mocap.imported_motion import ground_foreign_motion
 from tests.fixtures.person import person
@@ -49,6 +50,35 @@ def test_no_joint_turns_the_long_way_round_between_two_frames() -> None:
     root = Rotation.from_euler("ZXY", angles[:, :3], degrees=True)
     turned = Rotation.from_matrix(Y_UP_TO_WORLD) * root
     assert (turned * Rotation.from_rotvec(spun).inv()).magnitude().max() < 1e-5
+
+
+def z_up(text: str) -> str:
+    """Return a BVH of ours with z up, as Blender writes it back: (x, y, z) -> (x, -z, y)."""
+    turn, lines = Rotation.from_euler("x", 90.0, degrees=True), []
+    head, _, table = text.partition("Frame Time:")
+    for line in head.splitlines():
+        key, _, numbers = line.partition("OFFSET ")
+        offset = turn.apply(np.array(numbers.split(), float)) if numbers else None
+        lines.append(line if offset is None else f"{key}OFFSET {' '.join(map(str, offset))}")
+    period, *rows = table.splitlines()
+    lines[-1] += f"\nFrame Time:{period}" if lines[-1] else f"Frame Time:{period}"
+    for row in rows:
+        numbers = np.array(row.split(), float)
+        local = Rotation.from_euler("ZXY", numbers[3:].reshape(-1, 3), degrees=True)
+        angles = (turn * local * turn.inv()).as_euler("ZXY", degrees=True)
+        places = turn.apply(numbers[:3])
+        lines.append(" ".join(map(str, [*places, *angles.ravel()])))
+    return "\n".join(lines)
+
+
+def test_a_skeleton_of_smpl_whose_rest_pose_has_z_up_is_turned_to_smpls_axes() -> None:
+    sequence = person()
+    found = replace(bvh.read(z_up(bvh.write(sequence).decode()).encode()), to_world=np.eye(3))
+    np.testing.assert_allclose(found.rest_joints, sequence.rest_joints, atol=1e-5)
+    back = ground_foreign_motion(found, sequence.fps)
+    np.testing.assert_allclose(back.body_pose, sequence.body_pose, atol=1e-5)
+    quarter = Rotation.from_euler("z", -90.0, degrees=True)
+    np.testing.assert_allclose(quarter.apply(sequence.joints[9]), back.joints[9], atol=1e-4)
 
 
 STICK = """HIERARCHY
@@ -166,6 +196,29 @@ def test_another_skeletons_limbs_are_where_an_independent_reader_sees_them(tmp_p
     shift = np.median(found - expected, axis=(0, 1))
     assert np.abs(shift[:2]).max() < 1e-3
     np.testing.assert_allclose(found - shift, expected, atol=5e-3)
+
+
+def test_a_skeleton_that_ends_at_the_ankles_stands_on_our_feet() -> None:
+    """They are the rest pose's, turned as the shins are: by the hips' heading and a lifted leg."""
+    data = stick(twisted=True)
+    bare = data.replace(b"OFFSET 0.0 -6.0 18.0", b"OFFSET 0 0 0")
+    points, notes = keypoints_of(bvh_tree.parse(bare))
+    assert notes == ("no feet in the file: invented",)
+    assert keypoints_of(bvh_tree.parse(data))[1] == ()
+    size = 40.0 / np.linalg.norm(REST_OFFSETS[keypoint("left_knee")])
+    heading = Rotation.from_euler("y", [[0.0], [40.0], [90.0]], degrees=True)
+    lift = Rotation.from_euler("x", [[0.0], [-30.0], [0.0]], degrees=True)
+    for side, turned in (("left", heading), ("right", heading * lift)):
+        knee, ankle, toe = (keypoint(f"{side}_{name}") for name in ("knee", "ankle", "big_toe"))
+        shin = REST_JOINTS[ankle] - REST_JOINTS[knee]
+        upright, _ = Rotation.align_vectors([[0, -1, 0]], [shin])
+        expected = turned.apply(size * upright.apply(REST_JOINTS[toe] - REST_JOINTS[ankle]))
+        np.testing.assert_allclose(points[:, toe] - points[:, ankle], expected, atol=0.2)
+
+
+def test_the_note_on_invented_feet_reaches_the_motion() -> None:
+    bare = stick().replace(b"OFFSET 0.0 -6.0 18.0", b"OFFSET 0 0 0")
+    assert "no feet in the file: invented" in bvh.read(bare).notes
 
 
 def test_names_with_a_prefix_are_known() -> None:

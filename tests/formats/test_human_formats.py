@@ -45,6 +45,33 @@ def test_a_motion_comes_back_as_it_went(module: Any) -> None:
     np.testing.assert_allclose(back.joints, expected.joints, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("order", "line"),
+    [
+        ([*range(5), *range(9, FRAMES)], 7),
+        ([*range(9), *range(4, FRAMES)], 11),
+        ([*range(6), 7, 6, *range(8, FRAMES)], 8),
+        ([*range(FRAMES - 1, -1, -1)], 3),
+    ],
+    ids=["cut", "pasted", "exchanged", "backwards"],
+)
+def test_a_csv_whose_rows_are_not_in_time_is_refused_at_its_line(
+    order: list[int], line: int
+) -> None:
+    head, *lines = smpl_csv.write(person()).decode().splitlines()
+    with pytest.raises(BadTable, match=f"line {line}: time_s goes from"):
+        smpl_csv.read("\n".join([head, *(lines[n] for n in order)]).encode())
+
+
+@pytest.mark.parametrize("digits", [3, 2])
+def test_a_csv_with_rounded_times_and_blank_lines_keeps_its_tempo(digits: int) -> None:
+    head, *lines = smpl_csv.write(person()).decode().splitlines()
+    cells = [line.split(",") for line in lines]
+    table = [",".join([f"{float(first):.{digits}f}", *rest]) for first, *rest in cells]
+    found = smpl_csv.read("\n\n".join([head, *table]).encode())
+    assert found.fps == pytest.approx(person().fps, rel=0.02)
+
+
 @pytest.mark.parametrize("module", [bvh, smpl_csv])
 def test_formats_with_hands_bring_their_tips_back(module: Any) -> None:
     expected = person()

@@ -8,6 +8,7 @@ from PIL import Image
 
 from robojackson.report.video.animation import FPS, durations_ms, write_animation
 from robojackson.report.video.encoder import write_video
+from tests.fixtures.bad_clips import write_timed
 
 FRAMES = 60
 
@@ -39,7 +40,18 @@ def test_a_film_of_more_than_a_minute_is_shown_whole(tmp_path: Path) -> None:
     assert sum(durations_in(write_animation(film, tmp_path / "film.gif", "gif"))) == 61_000
 
 
+@pytest.mark.parametrize("kind", ["gif", "webp"])
+def test_pictures_of_a_varying_rate_are_shown_at_their_times(kind: str, tmp_path: Path) -> None:
+    """A second at 30 a second, a pause of 2.5 s, then a second at 5 a second."""
+    times = [*np.arange(30) / 30, *(3.5 + np.arange(5) / 5)]
+    film = tmp_path / "phone.mp4"
+    write_timed(film, ((t, np.full((32, 48, 3), 7 * k, np.uint8)) for k, t in enumerate(times)))
+    durations = durations_in(write_animation(film, tmp_path / f"film.{kind}", kind))
+    assert durations == pytest.approx([100] * 9 + [2600] + [200] * 4 + [durations[-1]], abs=10)
+    assert sum(durations) == pytest.approx(4300, abs=60)
+
+
 def test_durations_are_whole_units_whose_sum_does_not_wander() -> None:
-    durations = durations_ms(1000, 1 / 30)
+    durations = durations_ms([index / 30 for index in range(1001)])
     assert set(durations) == {30, 40}
     assert sum(durations) == 33_330

@@ -23,6 +23,8 @@ import numpy as np
 from tools.render import dance_floor, deepmimic
 from tools.render.anny_body import DANCER, JOINT_BONES, Body, PosedBody
 
+EVEN = 2
+"""Sides of a picture are multiples of this, pixels."""
 logger = logging.getLogger("render_dancer")
 
 
@@ -45,6 +47,11 @@ class Shot:
     height: int = 480
     quality: int = 18
 
+    def __post_init__(self) -> None:
+        """Raise `ValueError` where a side is odd: the colours of H.264 have half its pixels."""
+        if self.width % EVEN or self.height % EVEN:
+            raise ValueError(f"{self.width} x {self.height} pixels: both sides must be even")
+
 
 def render(motion_file: Path, out: Path, shot: Shot, phenotype: dict[str, float]) -> None:
     """Write OUT.mp4 and OUT_gt.npz."""
@@ -66,6 +73,7 @@ def write_video(path: Path, pictures: Iterable[np.ndarray], shot: Shot) -> None:
         fps=shot.fps,
         codec="libx264",
         quality=None,
+        macro_block_size=EVEN,  # imageio stretches to a multiple of it, by default of 16
         output_params=["-crf", str(shot.quality), "-preset", "slow", "-movflags", "+faststart"],
     )
     writer.send(None)

@@ -62,7 +62,7 @@ class TrackedPeople:
     Attributes:
         rows: One track a person, number 1 first; NaN where not detected.
         time_s: When each frame was taken, seconds.
-        info: The file.
+        info: The file; texts have the moments of the video of which it is a range.
     """
 
     rows: list[Float[np.ndarray, "T 33 7"]]
@@ -75,7 +75,7 @@ class TrackedPeople:
         return [self._person(number, rows) for number, rows in enumerate(self.rows, start=1)]
 
     def __str__(self) -> str:
-        listed = "; ".join(str(person) for person in self.people)
+        listed = "; ".join(str(person.later(self.info.begin_s)) for person in self.people)
         return listed or "no person is visible for long enough"
 
     def _person(self, number: int, rows: np.ndarray) -> Person:

@@ -12,7 +12,7 @@ import numpy as np
 
 from robojackson.clips.people.camera_path import stray_of
 from robojackson.clips.people.person_extent import BODY, heights_px, indices
-from robojackson.motion.landmark_track import LandmarkTrack
+from robojackson.motion.landmark_track import LandmarkTrack, evenly
 
 Kind = Literal[
     "frame_rate", "too_short", "person_small", "body_outside", "person_missing", "people",
@@ -83,7 +83,7 @@ def advise(track: LandmarkTrack, begin_s: float = 0.0) -> tuple[Advice, ...]:
     Args:
         begin_s: Where the clip begins in the video that the user has, seconds.
     """
-    ranges = {"person_missing": visible_range(track)}
+    ranges = {"person_missing": visible_range(evenly(track))}
     return tuple(
         Advice(kind, value, LIMITS[kind], ranges.get(kind)).later(begin_s)
         for kind, value in _figures(track).items()
@@ -98,7 +98,7 @@ def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
     moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
     return {
         "head_down": _head_down(track) if seen.any() else None,
-        "person_missing": float(seen.mean()) if len(track) else None,
+        "person_missing": float(evenly(track).detected.mean()) if len(track) else None,
         "people": float(track.people),
         "body_outside": _outside(track) if seen.any() else None,
         "person_small": height,

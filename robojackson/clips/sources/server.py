@@ -31,7 +31,8 @@ def search(
     if not page:
         raise SearchFailed(f"server: {clean_text(address or query)} is no http address")
     links = _Links()
-    links.feed(_page(page, config))
+    page, text = _page(page, config)
+    links.feed(text)
     own = (urljoin(page, link) for link in links.found)
     files = dict.fromkeys(url for url in own if _is_video(url, page))
     if not files:
@@ -39,7 +40,8 @@ def search(
     return [_candidate(url, query if address else "", now) for url in files]
 
 
-def _page(address: str, config: WebConfig) -> str:
+def _page(address: str, config: WebConfig) -> tuple[str, str]:
+    """Return where a page is, which links are relative to, after redirections; and its text."""
     handlers = []
     if config.proxy:
         handlers.append(urllib.request.ProxyHandler({"http": config.proxy, "https": config.proxy}))
@@ -49,7 +51,7 @@ def _page(address: str, config: WebConfig) -> str:
             public_only(config.private_addresses, config.proxy),
             opener.open(address, timeout=config.timeout_s) as answer,
         ):
-            return bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
+            return answer.url, bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
     except (OSError, ValueError) as cause:
         reason = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause
         raise SearchFailed(f"server: {clean_text(address)}: {clean_text(reason)}") from cause

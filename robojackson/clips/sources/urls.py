@@ -1,6 +1,7 @@
 """A list of addresses, one a line: in a file, or given with blanks between them."""
 
 import logging
+import re
 from datetime import datetime
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from robojackson.clips.web.yt_dlp_client import WebConfig
 from robojackson.errors import SearchFailed
 from robojackson.files.foreign_file import read_text
 
-COMMENT = "#"
+COMMENT_OF_A_LINE = re.compile(r"(?:^|\s)#")
+"""Where a comment begins: without white space before it, the sign is a part of an address."""
 IS_LOCAL = True
 LARGEST = 2**24
 """Bytes of a list."""
@@ -52,5 +54,6 @@ def _lines(text: str) -> list[str]:
         except (SearchFailed, OSError, ValueError) as cause:
             reason = cause.reason if isinstance(cause, SearchFailed) else "cannot be read"
             raise SearchFailed(f"urls: {clean_text(text)}: {reason}") from cause
-        return [line.strip() for line in listed if line.strip() and line[0] != COMMENT]
+        bare = (COMMENT_OF_A_LINE.split(line, 1)[0].strip() for line in listed)
+        return [line for line in bare if line]
     return text.split()

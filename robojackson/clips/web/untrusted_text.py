@@ -66,12 +66,14 @@ def safe_name(raw: object, address: str = "") -> str:
 
 
 def web_address(raw: object) -> str:
-    """Return an http or https address without spaces and control characters; empty for another
-    one."""
-    text = "".join(c for c in str(raw or "") if unicodedata.category(c)[0] not in "CZ")
+    """Return an http or https address without control characters, its spaces escaped as browsers
+    do; empty for another one, or one with a space in the name of its host."""
+    text = "".join(c for c in str(raw or "") if unicodedata.category(c)[0] != "C").strip()
     try:
         parts = urlsplit(text)
         if parts.scheme.lower() not in ("http", "https") or not parts.hostname:
+            return ""
+        if len(parts.netloc.split()) > 1:
             return ""
     except ValueError:
         return ""

@@ -2,7 +2,8 @@
 
 Known: SMPL, CMU, Mixamo, LAFAN1, 3ds Max's Biped without its prefix, and plain words. A spine of
 any number of joints is divided in the proportions of our spine; hands and toes are extended along
-their limb where there is no end site.
+their limb where there is no end site. Where a skeleton ends at the ankles, its feet are ours at
+rest.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.body.forward_kinematics import unit
-from robojackson.body.skeleton import KEYPOINT_NAMES, REST_OFFSETS, keypoint
+from robojackson.body.skeleton import KEYPOINT_NAMES, REST_JOINTS, REST_OFFSETS, keypoint
 from robojackson.errors import BadTable
 from robojackson.formats.containers.bvh_tree import WHERE, Tree
 from robojackson.formats.foreign_motion import listed
@@ -32,13 +33,14 @@ SIDED: Mapping[str, tuple[str, ...]] = {
     "wrist": ("wrist", "hand"),
 }
 """Names of a joint without its side, the most specific first; one joint is never used twice."""
+NO_FEET = "no feet in the file: invented"
 OPTIONAL = {"collar", "foot", "neck"}
 SPINE = ("spine1", "spine2", "spine3", "neck")
 _ASSIGNED_IN_TURN = ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "collar")
 
 
-def keypoints_of(tree: Tree) -> Float[np.ndarray, "T 29 3"]:
-    """Return the keypoints, units and axes of the file.
+def keypoints_of(tree: Tree) -> tuple[Float[np.ndarray, "T 29 3"], tuple[str, ...]]:
+    """Return the keypoints, units and axes of the file, and notes.
 
     Raises:
         BadTable: a required joint is not found.
@@ -52,12 +54,11 @@ def keypoints_of(tree: Tree) -> Float[np.ndarray, "T 29 3"]:
         shoulders = [keypoint("left_shoulder"), keypoint("right_shoulder")]
         points[:, keypoint("neck")] = points[:, shoulders].mean(1)
     _divide_spine(tree, where, places, points)
-    for side in ("left", "right"):
-        _finish_side(tree, where, places, points, side)
+    has_feet = [_finish_side(tree, where, places, points, side) for side in ("left", "right")]
     top = _tip(tree, where["head"], places)
     size = _rest("head_top") * _metre(points, "left")
     points[:, keypoint("head_top")] = _beyond(points, "neck", "head", size) if top is None else top
-    return points
+    return points, () if all(has_feet) else (NO_FEET,)
 
 
 def _find(tree: Tree) -> dict[str, int]:
@@ -110,8 +111,9 @@ def _divide_spine(
 
 def _finish_side(
     tree: Tree, where: Mapping[str, int], places: np.ndarray, points: np.ndarray, side: str
-) -> None:
-    """Fill in collar, hand, middle finger, ball of the foot and toe of one side."""
+) -> bool:
+    """Fill in collar, hand, middle finger, ball of the foot and toe of one side; return whether the
+    file has that foot."""
 
     def rest(name: str) -> float:
         return _rest(f"{side}_{name}") * metre
@@ -128,11 +130,35 @@ def _finish_side(
     put("middle", _beyond(points, elbow, wrist, rest("hand") + rest("middle")))
     if f"{side}_foot" not in where:
         tip = _tip(tree, where[f"{side}_ankle"], places)
-        put("foot", _beyond(points, f"{side}_knee", f"{side}_ankle", rest("foot"))
-            if tip is None else tip)  # fmt: skip
+        if tip is None:
+            ball, toe = _foot_at_rest(points, side, metre)
+            put("foot", ball)
+            put("big_toe", toe)
+            return False
+        put("foot", tip)
     tip = _tip(tree, where[f"{side}_foot"], places) if f"{side}_foot" in where else None
     further = _beyond(points, f"{side}_ankle", f"{side}_foot", rest("big_toe"))
     put("big_toe", further if tip is None else tip)
+    return True
+
+
+def _foot_at_rest(
+    points: Float[np.ndarray, "T 29 3"], side: str, metre: float
+) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Return ball of the foot and toe as they are at rest, seen from the shin and the hips."""
+    turn = _shin_frame(points, side) @ np.swapaxes(_shin_frame(REST_JOINTS[None], side), -1, -2)
+    ankle, ball, toe = (keypoint(f"{side}_{name}") for name in ("ankle", "foot", "big_toe"))
+    to_ball, to_toe = (metre * (REST_JOINTS[end] - REST_JOINTS[ankle]) for end in (ball, toe))
+    return points[:, ankle] + turn @ to_ball, points[:, ankle] + turn @ to_toe
+
+
+def _shin_frame(points: Float[np.ndarray, "T 29 3"], side: str) -> Float[np.ndarray, "T 3 3"]:
+    """Return axes in columns: ahead and to the left of the shin, by the line of the hips, and down
+    along it."""
+    down = unit(points[:, keypoint(f"{side}_ankle")] - points[:, keypoint(f"{side}_knee")])
+    left = points[:, keypoint("left_hip")] - points[:, keypoint("right_hip")]
+    ahead = unit(np.cross(down, left))
+    return np.stack([ahead, np.cross(ahead, down), down], -1)
 
 
 def _rest(name: str) -> float:

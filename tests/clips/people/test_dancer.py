@@ -129,6 +129,13 @@ def test_an_impossible_number_lists_who_is_there(
 
 
 @pytest.mark.medium
+def test_people_of_a_range_are_named_at_the_moments_of_their_video(crossed: Crossed) -> None:
+    later = replace(crossed.cast, info=replace(crossed.info, begin_s=40.0))
+    assert [person.from_s < 1.0 for person in crossed.cast.people] == [True, True]
+    assert str(later).count(", 40.") == 2
+
+
+@pytest.mark.medium
 def test_one_who_is_alone_is_seen_as_ever(tmp_path: Path) -> None:
     path = trim(CLIPS / "walk.mp4", 0.0, 0.5, tmp_path / "part.mp4")
     info = probe(path, VideoLimits())

@@ -152,3 +152,12 @@ def test_no_range_is_named_where_none_is_long_enough() -> None:
     assert advice.range_s is None
     assert "in sight" not in str(advice)
     assert set(advice.record) == {"kind", "value", "limit", "words"}
+
+
+def test_a_pause_of_the_camera_is_a_part_without_the_person() -> None:
+    times = np.arange(FRAMES) / 30.0 + np.where(np.arange(FRAMES) < 20, 0.0, 4.0)
+    found = {each.kind: each for each in advise(replace(good_track(), time_s=times))}
+    assert found["person_missing"].value == pytest.approx(90 / 210, abs=0.01)
+    assert found["person_missing"].range_s == pytest.approx(
+        (20 / 30 + 4.0, 89 / 30 + 4.0), abs=0.04
+    )

@@ -51,6 +51,17 @@ def test_a_folder_that_is_not_there_is_a_failed_search(tmp_path: Path) -> None:
         source("folder").search(str(tmp_path / "gone"), "", 10, WEB, NOW)
 
 
+def test_a_list_has_comments_and_names_with_spaces(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "urls.txt"
+    lines = "  # mine\n\t#\nhttp://host/my dance.mp4\t# the best\nhttp://host/p#part\n"
+    path.write_text(lines)
+    found = source("urls").search("", str(path), 10, WEB, NOW)
+    assert [c.url for c in found] == ["http://host/my%20dance.mp4", "http://host/p#part"]
+    assert not caplog.records
+
+
 def test_a_list_leaves_out_comments_and_what_is_no_address(tmp_path: Path) -> None:
     path = tmp_path / "urls.txt"
     path.write_text("# mine\nhttps://host/a.mp4\n\nfile:///etc/passwd\n  http://host/b?x=1  \n")

@@ -122,8 +122,13 @@ def test_only_http_is_an_address(raw: object) -> None:
     assert web_address(raw) == ""
 
 
-def test_an_address_loses_spaces_and_control_characters() -> None:
-    assert web_address("https://host/a b\n\x1b[0m?v=1&x=é") == "https://host/ab[0m?v=1&x=%C3%A9"
+def test_spaces_of_an_address_are_escaped_and_control_characters_go() -> None:
+    raw = "  https://host/a b\n\x1b[0m?v=1&x=é\u00a0y%20z \n"
+    assert web_address(raw) == "https://host/a%20b[0m?v=1&x=%C3%A9%C2%A0y%20z"
+
+
+def test_an_address_with_a_space_in_its_host_is_none() -> None:
+    assert web_address("https://my host/a") == ""
 
 
 @given(st.text())

@@ -185,6 +185,12 @@ def test_a_server_lists_its_own_videos(web: Web) -> None:
     assert [c.url.removeprefix(web.url) for c in found] == ["/good/clip.mp4", "/half/clip.webm"]
 
 
+def test_links_of_a_page_are_relative_to_where_it_was_redirected_to(web: Web) -> None:
+    found = source("server").search("", f"{web.url}/files/listed", 10, PATIENT, NOW)
+    addresses = [c.url.removeprefix(web.url) for c in found]
+    assert addresses == ["/files/good/clip.mp4", "/half/clip.webm"]
+
+
 @pytest.mark.parametrize("name", ["site", "server"])
 def test_a_page_that_is_not_there_is_a_failed_search(web: Web, name: str) -> None:
     with pytest.raises(SearchFailed, match="404"):
