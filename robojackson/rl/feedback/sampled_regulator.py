@@ -39,9 +39,9 @@ in all; and none after one that holds so great a share of its starts."""
 POOR_TRIES = 4
 """So many at least, however long the motion is, while little is held: what a single search of a
 long motion finds is decided by the last digits of sums, which processors round differently."""
-EFFORTS = (1.0, 0.25)
-"""Factors on the cost of the feedback's offsets: a stiffer regulator is taken where it holds much
-more."""
+EFFORTS = (1.0, 0.5, 0.25)
+"""Factors on the cost of the feedback's offsets, of which the smaller ones are stiffer: the first
+where it holds nearly all starts, else the second where no other holds clearly more."""
 CYCLES_S = 4.0
 """A motion that repeats is simulated for so long at least; the last cycle but one is kept."""
 
@@ -120,16 +120,21 @@ class _Tried(NamedTuple):
 
 
 def _best_effort(trial: Trial, gains_of: Callable[[float], Gains]) -> _Tried:
-    """Return the regulator of the first effort that no later one clearly beats."""
-    first = gains_of(EFFORTS[0])
-    best = _Tried(first, trial.held(first), EFFORTS[0])
-    for effort in EFFORTS[1:]:
-        if best.held.strictly >= 1 - AS_MANY:
-            break
-        found = gains_of(effort)
-        held = trial.held(found)
-        if held.strictly > best.held.strictly + AS_MANY:
-            best = _Tried(found, held, effort)
+    """Return the regulator of the effort that holds most (`EFFORTS`)."""
+
+    def tried(effort: float) -> _Tried:
+        gains = gains_of(effort)
+        return _Tried(gains, trial.held(gains), effort)
+
+    usual, stiffer = tried(EFFORTS[0]), EFFORTS[1:]
+    if usual.held.strictly >= 1 - AS_MANY or not stiffer:
+        return usual
+    best = tried(stiffer[0])
+    if best.held.strictly == usual.held.strictly == 0.0:
+        return usual
+    for other in (usual, *map(tried, stiffer[1:])):
+        if other.held.strictly > best.held.strictly + AS_MANY:
+            best = other
     return best
 
 

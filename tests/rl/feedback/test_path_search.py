@@ -159,27 +159,34 @@ def test_no_search_follows_one_that_holds_nearly_all(
 
 
 @pytest.mark.parametrize(
-    ("soft", "stiff", "taken"), [(0.6, 0.9, 0.25), (0.9, 0.93, 1.0), (0.97, 1.0, 1.0)]
+    ("shares", "taken"),
+    [
+        ((0.97, 1.0, 1.0), 1.0),
+        ((0.6, 0.9, 0.93), 0.5),
+        ((0.6, 0.9, 0.97), 0.25),
+        ((0.9, 0.87, 0.8), 0.5),
+        ((0.9, 0.6, 0.5), 1.0),
+        ((0.0, 0.0, 0.5), 1.0),
+    ],
 )
-def test_a_stiffer_regulator_is_taken_where_it_holds_clearly_more(
+def test_a_stiffer_regulator_is_taken_unless_another_holds_clearly_more(
     found: Callable[[], Gains],
     clip: Clip,
     robot: Robot,
     plain: tuple[Gains, Path, Linear],
     monkeypatch: pytest.MonkeyPatch,
-    soft: float,
-    stiff: float,
+    shares: tuple[float, ...],
     taken: float,
 ) -> None:
-    held = iter([soft, stiff])
-    monkeypatch.setattr(sampled_regulator, "EFFORTS", (1.0, 0.25))
+    efforts, held = (1.0, 0.5, 0.25), iter(shares)
+    monkeypatch.setattr(sampled_regulator, "EFFORTS", efforts)
     monkeypatch.setattr(sampled_regulator, "ENOUGH", 0.0)
     monkeypatch.setattr(Trial, "held", lambda *given: Held(next(held), 1.0, 1.0))
     gains = found()
     action = residual_scale(robot, ControlConfig())
     law = riccati(plain[2], action / np.sqrt(taken), clip.cyclic)
     np.testing.assert_allclose(gains.gain, law.gain, rtol=1e-6)
-    assert gains.held == (stiff if taken < 1 else soft)
+    assert gains.held == shares[efforts.index(taken)]
 
 
 @pytest.mark.parametrize(
