@@ -27,7 +27,8 @@ def text_files() -> Iterator[Path]:
             for name in inner
             if name not in NOT_OURS and (name == ".ci" or not name.startswith("."))
         ]
-        for path in (Path(folder) / name for name in sorted(names)):
+        ours = sorted(name for name in names if name != ".git")  # of a worktree, a file
+        for path in (Path(folder) / name for name in ours):
             if path.suffix in TEXT and path.stat().st_size < 1_000_000:
                 yield path
 
