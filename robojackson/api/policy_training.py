@@ -34,7 +34,7 @@ from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_re
 from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import load_policy
 from robojackson.rl.sim.trainable import require_trainable
-from robojackson.rl.training_hooks import Hooks, Row
+from robojackson.rl.training_hooks import Hooks, Row, stopped_by_interrupt
 from robojackson.rl.training_task import Task
 from robojackson.robot.model import Robot
 
@@ -101,7 +101,8 @@ def train_policy(
             checkpoint of another configuration.
         BadPolicy: the networks to start from do not fit.
         StoreError: another training holds the folder.
-        KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
+        KeyboardInterrupt: Ctrl-C, after a checkpoint of what was learnt was written to `out`; a
+            second one does not wait for it.
     """
     settings = _configured(config, setup, steps, minutes, seed)
     motion = read_if_path(ReferenceMotion, reference)
@@ -147,7 +148,8 @@ def _trained(
 
         try:
             joined = replace(_joined(hooks, rows, report), paying=paying)
-            result = training.train_policy(motion, robot, config, folder, joined)
+            with stopped_by_interrupt(joined) as stoppable:
+                result = training.train_policy(motion, robot, config, folder, stoppable)
         finally:
             if len(rows):
                 rows.save()
