@@ -96,6 +96,18 @@ def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
 
 
 @pytest.mark.medium
+def test_a_run_whose_budget_ends_before_its_first_step_goes_on(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """There is no observation yet, and a checkpoint that held none could not be read."""
+    whole, _, _, name = trained
+    spent = dataclasses.replace(brief(name), minutes=1e-9)
+    assert run(robot, sway, spent, tmp_path).steps == 0
+    result = run(robot, sway, brief(name), tmp_path)
+    assert result.policy.read_bytes() == whole.policy.read_bytes()
+
+
+@pytest.mark.medium
 def test_exploration_that_depends_on_the_state_goes_on_to_the_bit(
     robot: Robot, sway: ReferenceMotion, tmp_path: Path
 ) -> None:
