@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
-"""Options advised for the next training of a robot that does not dance."""
+"""Least budget advised for the next training of a robot that does not dance, minutes."""
 Figures = dict[str, Any]
 Overrides = Mapping[str, Any]
 

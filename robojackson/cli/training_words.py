@@ -1,6 +1,7 @@
 """The command that continues a training, with the settings in the training's folder."""
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from robojackson.pipeline.yaml_loader import load, parsed_overrides
 from robojackson.retarget.scorecard_gate import failures
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.evaluation.verdict import longer_minutes
 from robojackson.rl.policy import load_policy
 from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
 from robojackson.rl.training_task import completed_settings
@@ -42,10 +44,15 @@ def train_longer(reference: Path, folder: Path, minutes: float, robot: str | Non
     """Return the command that trains on in a folder, with every setting that is not the default.
 
     A checkpoint refuses other settings, whether from a file, an option or `--set`.
+
+    Args:
+        minutes: Least budget, minutes; a training that has used half of it gets more, since a
+            budget counts every sitting.
     """
     checkpoint = newest_checkpoint(folder)
     state = json.loads("{}" if checkpoint is None else (checkpoint / "run.json").read_text())
-    words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}", *cards.of_robot(robot))
+    budget = math.ceil(max(minutes, longer_minutes(state.get("seconds", 0.0) / 60)))
+    words = ("train", reference, "-o", folder, "--minutes", budget, *cards.of_robot(robot))
     settings = (f"--set={each}" for each in _unusual(state.get("configuration", {})))
     return cards.command_line(*words, *_forced(reference), *settings)
 

@@ -77,6 +77,15 @@ def test_its_settings_are_those_of_the_checkpoint(
     assert task.identity(load(TrainConfig, None, typed)) == task.identity(config)
 
 
+@pytest.mark.parametrize(("used", "minutes"), [(0.0, 20), (5.0, 20), (20.0, 40), (30.01, 61)])
+def test_the_budget_is_above_what_is_used(used: float, minutes: int, tmp_path: Path) -> None:
+    """A budget counts every sitting: the same 20 minutes trained nothing."""
+    folder = folder_of(USUAL, tmp_path)
+    file = folder / "checkpoint" / "run.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "seconds": 60 * used}))
+    assert train_longer(Path("r"), folder, 20).endswith(f" --minutes {minutes}")
+
+
 def test_a_checkpoint_from_before_a_setting_insists_on_that_of_then(tmp_path: Path) -> None:
     folder = folder_of(USUAL, tmp_path)
     file = folder / "checkpoint" / "run.json"
