@@ -2,8 +2,10 @@
 
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -141,6 +143,38 @@ def test_a_run_is_called_by_its_file_or_by_what_it_does(
 ) -> None:
     common = policy_training._labels(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
     assert (common["setup"], common["run_id"]) == (name, f"walk-{name}-s0")
+
+
+@pytest.mark.parametrize(
+    ("setup", "reward", "name", "terms"),
+    [
+        (None, None, "mine.2", {"bonus": len}),
+        ("setups/pretrain", abs, "pretrain", {"bonus": len, "own": abs}),
+    ],
+)
+def test_reward_terms_and_setup_of_the_hooks_are_those_of_the_training(
+    setup: str | None,
+    reward: Callable[..., Any] | None,
+    name: str,
+    terms: dict[str, Callable[..., Any]],
+    budgets: list,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    """Both were dropped, and a training went on without the term."""
+    seen: list[Hooks] = []
+
+    def learn(motion, robot, config: TrainConfig, out: Path, hooks: Hooks) -> None:
+        seen.append(hooks)
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(training, "train_policy", learn)
+    with pytest.raises(RejectedReference):
+        policy_training.train_policy(
+            tmp_path / "reference.parquet", setup=setup, reward=reward, force=True,
+            hooks=Hooks(rewards={"bonus": len}, setup="mine.2"),
+        )  # fmt: skip
+    assert [(hooks.setup, hooks.rewards) for hooks in seen] == [(name, terms)]
 
 
 def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:
