@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 from robojackson.api import policy_training
+from robojackson.api.trained_policy import TrainedPolicy
 from robojackson.cli.learning import training_process, training_request
+from robojackson.cli.lifetime import interruption
 from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
 from robojackson.errors import BadConfiguration, RejectedReference
@@ -18,6 +20,7 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl import training
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.policy import Policy
 from robojackson.rl.training_hooks import Hooks
 from robojackson.robot.model import RobotDescription, load_robot
 
@@ -175,6 +178,19 @@ def test_reward_terms_and_setup_of_the_hooks_are_those_of_the_training(
             hooks=Hooks(rewards={"bonus": len}, setup="mine.2"),
         )  # fmt: skip
     assert [(hooks.setup, hooks.rewards) for hooks in seen] == [(name, terms)]
+
+
+@pytest.mark.parametrize(
+    "words", [["--steps", "64"], ["--set", "train.steps=64"], ["--set=train.cpu_minutes=.01"]]
+)
+def test_after_a_training_that_learnt_nothing_no_other_budget_is_left(
+    words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With `--set train.steps=64` the next command learnt nothing again."""
+    monkeypatch.setattr(interruption.sys, "argv", ["robojackson", "train", "a.parquet", *words])
+    trained = TrainedPolicy(Policy((), {}), None, TrainConfig(), [], 64, 0, 1.0, "steps", {})  # type: ignore[arg-type]
+    answer = training_process._answer(trained, Path("a.parquet"), Path("policy.safetensors"), None)
+    assert answer["next"] == "robojackson train a.parquet --minutes 10"
 
 
 def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:
