@@ -1,7 +1,7 @@
 """What the deploy packs of a policy and of a tracker have in common."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -142,12 +142,15 @@ def write_pack(
     passport and its licences.
 
     Raises:
-        StoreError: they cannot be written.
+        StoreError: they cannot be written, or the folder holds such files and is no pack.
     """
     replaces = (folder / SETTINGS).is_file()
+    if not replaces:
+        _require_free(folder, files)
     with results_in(folder) as tree:
-        for name, content in files.items():
-            tree.write(name, content)
+        # The settings first, by which the folder is a pack, should this be interrupted.
+        for name in sorted(files, key=lambda name: name != SETTINGS):
+            tree.write(name, files[name])
         for name in OF_SOME - set(files) if replaces else ():
             tree.remove(name)
     rows = (evaluation or {}).get("passport") or []
@@ -160,6 +163,16 @@ def write_pack(
         "licences": together(ingredients),
         "unknown_licences": sorted({one.kind for one in ingredients if not one.is_known}),
     }
+
+
+def _require_free(folder: Path, names: Iterable[str]) -> None:
+    """Refuse a folder in which a pack would replace files of something else."""
+    for name in sorted(names):
+        if (folder / name).exists():
+            raise StoreError(
+                f"{folder / name}: of something else, since {folder} has no {SETTINGS}, and a pack "
+                "here would replace it; give another folder (-o)"
+            )
 
 
 def _strict_of(row: Figures) -> float:

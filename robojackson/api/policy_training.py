@@ -34,7 +34,7 @@ from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_re
 from robojackson.rl.modes.rewards import RewardFunction
 from robojackson.rl.policy import load_policy
 from robojackson.rl.sim.trainable import require_trainable
-from robojackson.rl.training_hooks import Hooks, Row
+from robojackson.rl.training_hooks import Hooks, Row, stopped_by_interrupt
 from robojackson.rl.training_task import Task
 from robojackson.robot.model import Robot
 
@@ -88,7 +88,7 @@ def train_policy(
         move: Name of the dance in the tables.
         run_id: Name of the run in the tables; made of move, setup and seed when empty.
         force: Train on a motion that the gate refuses, too.
-        hooks: Callbacks of progress, and how it is stopped.
+        hooks: Callbacks of progress, how it is stopped, and further reward terms.
         progress: True shows a bar; a function gets a row every few seconds: steps, seconds_left,
             survived_s, site_error_m, episode_return.
 
@@ -101,7 +101,7 @@ def train_policy(
             checkpoint of another configuration.
         BadPolicy: the networks to start from do not fit.
         StoreError: another training holds the folder.
-        KeyboardInterrupt: Ctrl-C, after a checkpoint was written to `out`.
+        KeyboardInterrupt: Ctrl-C, after a checkpoint of what was learnt was written to `out`.
     """
     settings = _configured(config, setup, steps, minutes, seed)
     motion = read_if_path(ReferenceMotion, reference)
@@ -110,17 +110,19 @@ def train_policy(
     if not force:
         check(scorecard_record(motion))
     name = move or ("motion" if isinstance(reference, ReferenceMotion) else motion_name(reference))
-    labels = _labels(settings, name, setup, run_id)
-    heard = replace(hooks or Hooks(), setup=labels["setup"], rewards=_named(reward))
+    labels = _labels(settings, name, setup, run_id, hooks.setup if hooks else "")
+    heard = replace(_paying(hooks or Hooks(), reward), setup=labels["setup"])
     with _folder(out) as folder, _telling(progress, f"training {name}") as report:
         return _trained(motion, machine, settings, folder, labels, heard, report)
 
 
-def _labels(config: TrainConfig, move: str, setup: FilePath | None, run_id: str) -> dict[str, Any]:
-    """Return the labels of the run's rows."""
+def _labels(
+    config: TrainConfig, move: str, setup: FilePath | None, run_id: str, named: str = ""
+) -> dict[str, Any]:
+    """Return the labels of the run's rows; `named` is the setup's name where no file gives one."""
     usual = SETUPS[config.start != "scratch", config.curiosity != "off"]
     usual = OF_DANCER if config.start == "dancer" else usual
-    labels = run_labels(move, Path(setup).stem if setup else usual, config.seed)
+    labels = run_labels(move, Path(setup).stem if setup else named or usual, config.seed)
     return labels | ({"run_id": require_run_id(run_id)} if run_id else {})
 
 
@@ -147,7 +149,8 @@ def _trained(
 
         try:
             joined = replace(_joined(hooks, rows, report), paying=paying)
-            result = training.train_policy(motion, robot, config, folder, joined)
+            with stopped_by_interrupt(joined) as stoppable:
+                result = training.train_policy(motion, robot, config, folder, stoppable)
         finally:
             if len(rows):
                 rows.save()
@@ -189,12 +192,12 @@ def setup_file(name: FilePath | None) -> str | None:
     return text if {"/", "."} & set(text) else f"setups/{text}"
 
 
-def _named(
-    reward: RewardFunction | Mapping[str, RewardFunction] | None,
-) -> Mapping[str, RewardFunction]:
+def _paying(hooks: Hooks, reward: RewardFunction | Mapping[str, RewardFunction] | None) -> Hooks:
+    """Return hooks with the reward terms of an argument beside their own."""
     if reward is None:
-        return {}
-    return reward if isinstance(reward, Mapping) else {OWN_REWARD: reward}
+        return hooks
+    named = reward if isinstance(reward, Mapping) else {OWN_REWARD: reward}
+    return replace(hooks, rewards={**hooks.rewards, **named})
 
 
 def _joined(hooks: Hooks, rows: EpisodeLog, report: Callable[[Row], None]) -> Hooks:

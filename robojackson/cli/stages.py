@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robojackson.pipeline.pipeline_config import PipelineConfig
 
 LONGER_MINUTES = 20
-"""Options advised for the next training of a robot that does not dance."""
+"""Least budget advised for the next training of a robot that does not dance, minutes."""
 ALONE: "Kind" = "person_missing"
 """Advice about one camera alone: where another one sees the person, none is missing."""
 Figures = dict[str, Any]

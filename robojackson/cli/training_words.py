@@ -1,18 +1,25 @@
 """The command that continues a training, with the settings in the training's folder."""
 
 import json
-from dataclasses import asdict
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from robojackson.cli import cards
-from robojackson.config import leaves
+from robojackson.errors import BadConfiguration
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.pipeline.yaml_loader import load, parsed_overrides
 from robojackson.retarget.scorecard_gate import failures
 from robojackson.rl.checkpoint_folder import newest_checkpoint
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.evaluation.verdict import longer_minutes
 from robojackson.rl.policy import load_policy
 from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
 from robojackson.rl.training_task import completed_settings
+
+CHOICES = ("mode", "tqc.preset", "paper.preset")
+"""Settings that decide the defaults of others, each before those that it decides."""
 
 
 def train_this(reference: Path, robot: str | None = None) -> str:
@@ -37,9 +44,16 @@ def train_longer(reference: Path, folder: Path, minutes: float, robot: str | Non
     """Return the command that trains on in a folder, with every setting that is not the default.
 
     A checkpoint refuses other settings, whether from a file, an option or `--set`.
+
+    Args:
+        minutes: Least budget, minutes; a training that has used half of it gets more, since a
+            budget counts every sitting.
     """
-    words = ("train", reference, "-o", folder, "--minutes", f"{minutes:g}", *cards.of_robot(robot))
-    settings = (f"--set={each}" for each in _unusual(folder))
+    checkpoint = newest_checkpoint(folder)
+    state = json.loads("{}" if checkpoint is None else (checkpoint / "run.json").read_text())
+    budget = math.ceil(max(minutes, longer_minutes(state.get("seconds", 0.0) / 60)))
+    words = ("train", reference, "-o", folder, "--minutes", budget, *cards.of_robot(robot))
+    settings = (f"--set={each}" for each in _unusual(state.get("configuration", {})))
     return cards.command_line(*words, *_forced(reference), *settings)
 
 
@@ -49,19 +63,41 @@ def _forced(reference: Path) -> tuple[str, ...]:
     return ("--force",) if known else ()
 
 
-def _unusual(folder: Path) -> list[str]:
-    """Return the settings of a training as KEY=VALUE; none where its folder has no checkpoint."""
-    checkpoint = newest_checkpoint(folder)
-    if checkpoint is None:
-        return []
-    usual = dict(leaves(json.loads(json.dumps(asdict(TrainConfig())))))
-    kept = json.loads((checkpoint / "run.json").read_text())["configuration"]
-    own = leaves(completed_settings(kept))
-    return [
-        f"{key}={value if isinstance(value, str) else json.dumps(value)}"
-        for key, value in own
-        if key in usual and usual[key] != value
-    ]
+def _unusual(kept: Mapping[str, object]) -> list[str]:
+    """Return the settings of a checkpoint as KEY=VALUE that are not the defaults of its mode and
+    presets."""
+    own, chosen = completed_settings(kept), dict[str, str]()
+    for key in CHOICES:
+        apart = dict(_differences(load(TrainConfig, None, chosen), own))
+        if key in apart:
+            chosen[key] = _as_yaml(apart[key])
+    rest = _differences(load(TrainConfig, None, chosen), own)
+    found = chosen | {key: _as_yaml(value) for key, value in rest}
+    return [f"{key}={value}" for key, value in found.items()]
+
+
+def _differences(usual: object, kept: object, key: str = "") -> Iterator[tuple[str, object]]:
+    """Yield what a checkpoint holds where it differs from a configuration, by key path; a mapping
+    that is no section is one value."""
+    if not (is_dataclass(usual) and isinstance(kept, Mapping)):
+        if kept != json.loads(json.dumps(usual)):
+            yield key, kept
+        return
+    for one in fields(usual):
+        if one.name in kept:
+            inner = f"{key}.{one.name}" if key else one.name
+            yield from _differences(getattr(usual, one.name), kept[one.name], inner)
+
+
+def _as_yaml(value: object) -> str:
+    """Return a value as `--set` reads it, text quoted only where YAML would read something else."""
+    if not isinstance(value, str):
+        return json.dumps(value)
+    try:
+        is_plain = parsed_overrides({"": value}) == {"": value}
+    except BadConfiguration:
+        is_plain = False
+    return value if is_plain else json.dumps(value, ensure_ascii=False)
 
 
 def is_fed_onboard(policy: Path) -> bool:

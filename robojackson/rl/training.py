@@ -32,6 +32,7 @@ from robojackson.rl.tqc.network_arrays import (
     widened,
     with_exploration,
 )
+from robojackson.rl.tqc.trainer import Trainer
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training_hooks import BudgetSpent, Choice, Hooks, as_trained
 from robojackson.rl.training_run import Run
@@ -56,6 +57,7 @@ def train_policy(
     Raises:
         BadConfiguration: the configuration has no budget.
         BadPolicy: the networks to start from do not fit.
+        TrainingDiverged: networks hold values that are not finite; the last checkpoint stays.
         KeyboardInterrupt: after a checkpoint was written.
     """
     if not config.has_budget:
@@ -87,7 +89,7 @@ def train_policy(
     choice = _choice(tqc, config, reference, robot, core)
     try:
         if not run.finished():
-            trainer.learn(run.callback)
+            _learn(trainer, run)
         elif newest_checkpoint(out) is None or (choice is not as_trained and not _is_chosen(out)):
             run.checkpoint(choice)
     except BudgetSpent:
@@ -95,6 +97,19 @@ def train_policy(
     finally:
         env.close()
     return run.result()
+
+
+def _learn(trainer: Trainer, run: Run) -> None:
+    """Learn until the budget is used up.
+
+    Raises:
+        TrainingDiverged: also within a round, where torch refuses a distribution of NaN.
+    """
+    try:
+        trainer.learn(run.callback)
+    except ValueError:
+        run.require_finite()
+        raise
 
 
 def _start(config: TrainConfig, robot: Robot, out: Path) -> Networks | None:

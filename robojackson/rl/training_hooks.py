@@ -1,7 +1,10 @@
 """Callbacks of a training: reports to the caller, and a way to stop."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 from robojackson.rl.config.train_config import PaperConfig, TrackConfig
 from robojackson.rl.modes.rewards import RewardFunction
@@ -48,3 +51,47 @@ class Hooks:
     audited: Callable[[Mapping[str, Mapping[str, float]]], None] = lambda audit: None
     paying: Callable[[TrackConfig | PaperConfig], None] = lambda environment: None
     rewards: Mapping[str, RewardFunction] = field(default_factory=dict)
+
+
+@contextmanager
+def stopped_by_interrupt(hooks: Hooks) -> Iterator[Hooks]:
+    """Yield hooks with which Ctrl-C ends a training after a round, with a checkpoint.
+
+    A second Ctrl-C ends it at once, and so does one before there is learning to save. Nothing
+    changes outside the main thread, or where another handler than Python's own receives SIGINT.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C, also where the training was over before it could stop.
+    """
+    default = signal.default_int_handler
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not default:
+        yield hooks
+        return
+    interrupt = _Interrupt(hooks)
+    signal.signal(signal.SIGINT, interrupt.receive)
+    try:
+        yield replace(hooks, stop=interrupt.stop, on_learning=interrupt.mark_learning)
+    finally:
+        signal.signal(signal.SIGINT, default)
+    if interrupt.received:
+        raise KeyboardInterrupt
+
+
+class _Interrupt:
+    """Whether Ctrl-C was pressed while there was learning to save."""
+
+    def __init__(self, hooks: Hooks) -> None:
+        self._hooks, self._has_learnt, self.received = hooks, False, False
+
+    def stop(self) -> bool:
+        return self._hooks.stop() or self.received
+
+    def mark_learning(self) -> None:
+        self._has_learnt = True
+        self._hooks.on_learning()
+
+    def receive(self, number: int, frame: object) -> None:
+        if self.received or not self._has_learnt:
+            raise KeyboardInterrupt
+        self.received = True

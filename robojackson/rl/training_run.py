@@ -124,11 +124,20 @@ class Run:
             TrainingDiverged: weights are not finite; nothing is written.
             StoreError: the folder cannot be written.
         """
-        networks = self.trainer.networks()
-        self._require_finite(networks.values())
+        networks = self.require_finite()
         self._hooks.saving()
         write_checkpoint(self.out, self._save, self._results(networks, choice))
         self.trainer.saved()
+
+    def require_finite(self) -> Tensors:
+        """Return the networks.
+
+        Raises:
+            TrainingDiverged: values are not finite.
+        """
+        networks = self.trainer.networks()
+        self._require_finite(networks.values())
+        return networks
 
     def result(self) -> TrainResult:
         """Return the result of the run."""

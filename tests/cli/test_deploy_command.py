@@ -10,6 +10,7 @@ from robojackson.api.pack_parts import write_pack
 from robojackson.api.policy_ingredients import motion_ingredients
 from robojackson.cli.exporting import PackInputs, export, licences_from
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError
+from robojackson.files.file_tree import FileTree
 from robojackson.formats.deploy.licence_passport import Ingredient
 from robojackson.motion.reference_motion import poses_sha256
 from robojackson.rl.policy import Policy, load_policy
@@ -117,6 +118,27 @@ def test_a_pack_takes_the_place_of_another(folder: Path) -> None:
     assert (pack / "passport.json").exists(), "the folder held no pack"
     write_pack(pack, {"deploy.yaml": b"", "policy.onnx": b"new"}, clip, None)
     assert {path.name for path in pack.iterdir()} == {"deploy.yaml", "policy.onnx", "own_notes.txt"}
+
+
+def test_files_of_something_else_are_not_replaced(folder: Path) -> None:
+    """A project's own README.md and run.py were overwritten without a word."""
+    own = folder / "project" / "README.md"
+    own.parent.mkdir()
+    own.write_text("mine")
+    with pytest.raises(StoreError, match=r"README\.md: of something else.*folder \(-o\)") as caught:
+        write_deploy_pack(folder / "policy.safetensors", own.parent)
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in own.parent.iterdir()] == ["README.md"]
+    assert own.read_text() == "mine"
+
+
+def test_a_pack_that_was_interrupted_is_written_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(FileTree, "write", lambda tree, name, content: written.append(name))
+    write_deploy_pack(folder / "policy.safetensors", folder / "pack")
+    assert written[0] == "deploy.yaml", "by which the folder is a pack"
 
 
 def test_a_policy_that_sees_what_no_robot_measures_is_refused(folder: Path) -> None:

@@ -1,6 +1,7 @@
 """The command that goes on with a training."""
 
 import json
+import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -10,9 +11,10 @@ import pytest
 from robojackson.cli.cards import command_line
 from robojackson.cli.training_words import train_after, train_longer, train_this
 from robojackson.motion.reference_motion import poses_sha256
+from robojackson.pipeline.yaml_loader import load
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.policy import Policy
-from robojackson.rl.training_task import NOT_GIVEN
+from robojackson.rl.training_task import NOT_GIVEN, Task
 from tests.fixtures.robots import robot_motion
 
 USUAL = TrainConfig()
@@ -42,6 +44,46 @@ def test_it_names_every_setting_that_the_checkpoint_insists_on(
     folder = folder_of(config, tmp_path)
     result = train_longer(Path("r.parquet"), folder, 20)
     assert result == f"robojackson train r.parquet -o {folder} --minutes 20{words}"
+
+
+@pytest.mark.parametrize(
+    ("setup", "given"),
+    [
+        (None, {"mode": "paper"}),
+        (None, {"mode": "paper", "tqc.n_steps": "3"}),
+        (None, {"mode": "paper", "tqc.preset": "dance"}),
+        (None, {"mode": "paper", "tqc.preset": "released", "tqc.batch": "256", "trainer": "sb3"}),
+        (None, {"mode": "paper", "paper.preset": "released", "paper.lambda_max": "1.0"}),
+        (None, {"mode": "paper", "paper.weights": "{pelvis: 1.0}"}),
+        (None, {"tqc.preset": "polish", "tqc.zero_init": "false"}),
+        (None, {"track.observation": "onboard", "track.random.integrators": "[RK4, Euler]"}),
+        (None, {"start": "'runs #2/[v2] é.safetensors'"}),
+        (None, {"start": "'3'"}),
+        ("setups/walker-paper", {}),
+        ("setups/pretrained-dancer", {}),
+    ],
+)
+def test_its_settings_are_those_of_the_checkpoint(
+    setup: str | None, given: dict[str, str], tmp_path: Path
+) -> None:
+    """What equals a default of another mode or preset was left out, and then refused."""
+    task, config = Task("humanoid", "a", "b", "c"), load(TrainConfig, setup, given)
+    folder = folder_of(config, tmp_path)
+    state = {"configuration": task.identity(config)}
+    (folder / "checkpoint" / "run.json").write_text(json.dumps(state))
+    words = shlex.split(train_longer(Path("r"), folder, 20))
+    pairs = [word.removeprefix("--set=") for word in words if word.startswith("--set=")]
+    typed = dict(pair.split("=", 1) for pair in pairs)
+    assert task.identity(load(TrainConfig, None, typed)) == task.identity(config)
+
+
+@pytest.mark.parametrize(("used", "minutes"), [(0.0, 20), (5.0, 20), (20.0, 40), (30.01, 61)])
+def test_the_budget_is_above_what_is_used(used: float, minutes: int, tmp_path: Path) -> None:
+    """A budget counts every sitting: the same 20 minutes trained nothing."""
+    folder = folder_of(USUAL, tmp_path)
+    file = folder / "checkpoint" / "run.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "seconds": 60 * used}))
+    assert train_longer(Path("r"), folder, 20).endswith(f" --minutes {minutes}")
 
 
 def test_a_checkpoint_from_before_a_setting_insists_on_that_of_then(tmp_path: Path) -> None:

@@ -1,13 +1,18 @@
 """What a training announces to whoever may stop it."""
 
 import dataclasses
+import signal
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from robojackson.api import policy_training
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.train_config import TqcConfig, TrainConfig
 from robojackson.rl.training import Hooks, train_policy
+from robojackson.rl.training_hooks import stopped_by_interrupt
 from robojackson.rl.training_run import Run
 from robojackson.robot.model import Robot
 
@@ -57,3 +62,65 @@ def test_a_resumed_training_announces_only_what_its_checkpoint_lacks(
     )
     assert updates[0] > 0
     assert announced == [next(i for i, n in enumerate(updates, 1) if n > updates[0])]
+
+
+@pytest.fixture
+def handler() -> Iterator[None]:
+    """Give SIGINT Python's own handler, which a worker of xdist may not have."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.medium
+def test_an_interrupt_of_the_function_saves_what_was_learnt(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, updates: list[int], handler: None
+) -> None:
+    """Only the command did: the exception landed anywhere in a round."""
+    hooks = Hooks(on_learning=lambda: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        policy_training.train_policy(
+            sway, robot, config=CONFIG, out=tmp_path, force=True, hooks=hooks
+        )
+    assert (tmp_path / "checkpoint" / "run.json").is_file()
+    assert updates[-1] > 0
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def interrupt(times: int, learnt: bool, stops: list[bool]) -> None:
+    """Press Ctrl-C in a training, and add after each what `stop` returns."""
+    with stopped_by_interrupt(Hooks()) as hooks:
+        if learnt:
+            hooks.on_learning()
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+            stops.append(hooks.stop())
+
+
+@pytest.mark.parametrize(
+    ("times", "learnt", "expected"), [(1, True, [True]), (2, True, [True]), (1, False, [])]
+)
+def test_an_interrupt_requests_a_stop_where_there_is_learning_and_a_second_one_ends_at_once(
+    times: int, learnt: bool, expected: list[bool], handler: None
+) -> None:
+    """The exception comes too where the training ends by itself before it can stop."""
+    stops: list[bool] = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupt(times, learnt, stops)
+    assert stops == expected
+
+
+def test_another_handler_and_another_thread_are_left_alone(handler: None) -> None:
+    given, found = Hooks(), []
+
+    def enter() -> None:
+        with stopped_by_interrupt(given) as hooks:
+            found.append(hooks)
+
+    thread = threading.Thread(target=enter)
+    thread.start()
+    thread.join()
+    signal.signal(signal.SIGINT, lambda *signalled: None)
+    enter()
+    assert all(hooks is given for hooks in found)
+    assert len(found) == 2

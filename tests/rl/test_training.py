@@ -10,6 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+import torch
 
 from robojackson.errors import BadConfiguration, BadPolicy, StoreError, TrainingDiverged
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -29,7 +30,7 @@ from robojackson.rl.evaluation.policy_evaluation import evaluate_policy
 from robojackson.rl.evaluation.starts import STAND
 from robojackson.rl.policy import Policy, load_policy
 from robojackson.rl.policy_facts import OUTLINE, outline_facts
-from robojackson.rl.tqc.sb3_trainer import Sb3Trainer
+from robojackson.rl.tqc.sb3_trainer import Sb3Trainer, WarmupTQC
 from robojackson.rl.tqc.sbx_trainer import SbxTrainer
 from robojackson.rl.tqc.trainers import make_trainer
 from robojackson.rl.training import Hooks, TrainResult, train_policy
@@ -93,6 +94,18 @@ def test_a_run_in_two_sittings_ends_as_one_that_was_never_stopped(
     result = train_policy(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert result.policy.read_bytes() == whole.policy.read_bytes()
     assert rows == episodes
+
+
+@pytest.mark.medium
+def test_a_run_whose_budget_ends_before_its_first_step_goes_on(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """There is no observation yet, and a checkpoint that held none could not be read."""
+    whole, _, _, name = trained
+    spent = dataclasses.replace(brief(name), minutes=1e-9)
+    assert run(robot, sway, spent, tmp_path).steps == 0
+    result = run(robot, sway, brief(name), tmp_path)
+    assert result.policy.read_bytes() == whole.policy.read_bytes()
 
 
 @pytest.mark.medium
@@ -424,6 +437,32 @@ def test_a_diverging_training_reports_it_and_keeps_its_policy(
         with pytest.raises(TrainingDiverged, match=r"160 steps.*checkpoint is older"):
             train_policy(sway, robot, brief(name), tmp_path, Hooks(sink=rows.extend))
     assert rows == []
+    assert (tmp_path / "policy.safetensors").read_bytes() == kept
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("gsde", [False, True])
+@pytest.mark.parametrize("method", ["train", "_store_transition"])
+def test_a_training_that_diverges_within_a_round_of_torch_reports_it(
+    method: str, gsde: bool, robot: Robot, sway: ReferenceMotion, tmp_path: Path
+) -> None:
+    """Torch refuses the distribution of its actions with a ValueError, before the next check."""
+    tqc = dataclasses.replace(SMALL, gsde=gsde)
+    config = dataclasses.replace(brief("sb3"), tqc=tqc)
+    run(robot, sway, dataclasses.replace(config, steps=160), tmp_path)
+    kept = (tmp_path / "policy.safetensors").read_bytes()
+    original = getattr(WarmupTQC, method)
+
+    def spoil(model: WarmupTQC, *args: Any, **named: Any) -> None:
+        with torch.no_grad():
+            for parameter in model.actor.parameters():
+                parameter.fill_(torch.nan)
+        original(model, *args, **named)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WarmupTQC, method, spoil)
+        with pytest.raises(TrainingDiverged, match=r"not finite .*checkpoint is older"):
+            run(robot, sway, config, tmp_path)
     assert (tmp_path / "policy.safetensors").read_bytes() == kept
 
 

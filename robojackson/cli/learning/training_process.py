@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robojackson.cli import cards, console
-from robojackson.cli.learning.training_request import requested
+from robojackson.cli.learning.training_request import SECTION, requested
 from robojackson.cli.lifetime.interruption import STOPS, UnsavedFlag, is_guarded, with_option
 from robojackson.cli.lifetime.parent_death import end_with_parent
 
@@ -94,7 +94,8 @@ def _answer(
     following = cards.command_line("evaluate", policy, reference, *cards.of_robot(robot))
     if verdict["kind"] == "untrained":
         minutes = f"{USUAL_MINUTES:g}"
-        following = with_option("--minutes", minutes, without=("--steps",), unset=BUDGETS)
+        budgets = (*BUDGETS, *(f"{SECTION}{name}" for name in BUDGETS))
+        following = with_option("--minutes", minutes, without=("--steps",), unset=budgets)
     return {
         "policy": str(policy),
         "reference": str(reference),

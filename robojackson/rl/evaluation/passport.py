@@ -55,10 +55,21 @@ class Case:
     variation: Variation = field(default_factory=Variation)
     conditions: Conditions = field(default_factory=Conditions)
 
+    @property
+    def is_of_pd(self) -> bool:
+        """Return whether the case changes what a PD law and its observation alone have."""
+        return self.variation.gains != 1 or self.conditions.random.sensor_noise > 0
 
-def cases(robot: Robot, seed: int) -> list[Case]:
-    """Yield all cases of a robot, the nominal one first."""
-    return [Case(NOMINAL), *_bodies(), *_stepping(robot), *_signals(robot, seed)]
+
+def cases(robot: Robot, seed: int, law: str = "pd") -> list[Case]:
+    """Return all cases of a robot, the nominal one first.
+
+    Args:
+        law: Law of control; `torque` (mode paper) has no gains, and its policies read the state of
+            the simulation, so that it has no cases of gains and sensor noise.
+    """
+    found = [Case(NOMINAL), *_bodies(), *_stepping(robot), *_signals(robot, seed)]
+    return [case for case in found if law != "torque" or not case.is_of_pd]
 
 
 def _bodies() -> Iterator[Case]:
@@ -135,7 +146,7 @@ def passport(
     rows: list[dict[str, Any]] = []
     driver = trained_driver(policy, robot, reference)
     clip = driven_clip(robot, reference, driver.control, sees_ahead(policy))
-    every = cases(robot, config.seed)
+    every = cases(robot, config.seed, driver.control.law)
     for number, case in enumerate(every):
         progress(case.name, number, len(every))
         figures = _evaluate_case(driver, clip, reference, robot, config, case)

@@ -15,6 +15,8 @@ from robojackson.rl.tqc.random_state import load_random, save_random
 from robojackson.rl.tqc.replay_files import ReplayFiles, buffer_of
 
 FOREVER = 10**12
+OBSERVATION = "observation.npy"
+"""The last observation in a checkpoint; missing in one from before the first step."""
 
 
 def arguments(config: TqcConfig, seed: int, env: VecEnv) -> dict[str, Any]:
@@ -93,14 +95,16 @@ class OffPolicyTrainer:
 
     def _save_rest(self, folder: Path, replay: Path) -> None:
         save_random(folder / "random.json", self._generators)
-        np.save(folder / "observation.npy", self.model._last_obs)
+        if self.model._last_obs is not None:
+            np.save(folder / OBSERVATION, self.model._last_obs)
         self._files = self._files or ReplayFiles(replay)
         self._files.save(buffer_of(self.model), self._rows())
 
     def _load_rest(self, folder: Path, replay: Path, steps: int, updates: int) -> None:
         self.model.num_timesteps, self.model._n_updates = steps, updates
         load_random(folder / "random.json", self._generators)
-        self.model._last_obs = np.load(folder / "observation.npy", allow_pickle=False)
+        if (folder / OBSERVATION).is_file():
+            self.model._last_obs = np.load(folder / OBSERVATION, allow_pickle=False)
         self.model._last_episode_starts = np.zeros(self.model.n_envs, bool)
         self._files = ReplayFiles(replay)
         self._files.load(buffer_of(self.model), self._rows())

@@ -2,13 +2,17 @@
 
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from robojackson.api import policy_training
+from robojackson.api.trained_policy import TrainedPolicy
 from robojackson.cli.learning import training_process, training_request
+from robojackson.cli.lifetime import interruption
 from robojackson.cli.lifetime.interruption import UNSAVED
 from robojackson.cli.lifetime.orphans import VARIABLE, holding
 from robojackson.errors import BadConfiguration, RejectedReference
@@ -16,6 +20,7 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from robojackson.rl import training
 from robojackson.rl.config.train_config import TrainConfig
+from robojackson.rl.policy import Policy
 from robojackson.rl.training_hooks import Hooks
 from robojackson.robot.model import RobotDescription, load_robot
 
@@ -141,6 +146,51 @@ def test_a_run_is_called_by_its_file_or_by_what_it_does(
 ) -> None:
     common = policy_training._labels(TrainConfig(**given), "walk", setup, "")  # type: ignore[arg-type]
     assert (common["setup"], common["run_id"]) == (name, f"walk-{name}-s0")
+
+
+@pytest.mark.parametrize(
+    ("setup", "reward", "name", "terms"),
+    [
+        (None, None, "mine.2", {"bonus": len}),
+        ("setups/pretrain", abs, "pretrain", {"bonus": len, "own": abs}),
+    ],
+)
+def test_reward_terms_and_setup_of_the_hooks_are_those_of_the_training(
+    setup: str | None,
+    reward: Callable[..., Any] | None,
+    name: str,
+    terms: dict[str, Callable[..., Any]],
+    budgets: list,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    """Both were dropped, and a training went on without the term."""
+    seen: list[Hooks] = []
+
+    def learn(motion, robot, config: TrainConfig, out: Path, hooks: Hooks) -> None:
+        seen.append(hooks)
+        raise RejectedReference("no")
+
+    monkeypatch.setattr(training, "train_policy", learn)
+    with pytest.raises(RejectedReference):
+        policy_training.train_policy(
+            tmp_path / "reference.parquet", setup=setup, reward=reward, force=True,
+            hooks=Hooks(rewards={"bonus": len}, setup="mine.2"),
+        )  # fmt: skip
+    assert [(hooks.setup, hooks.rewards) for hooks in seen] == [(name, terms)]
+
+
+@pytest.mark.parametrize(
+    "words", [["--steps", "64"], ["--set", "train.steps=64"], ["--set=train.cpu_minutes=.01"]]
+)
+def test_after_a_training_that_learnt_nothing_no_other_budget_is_left(
+    words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With `--set train.steps=64` the next command learnt nothing again."""
+    monkeypatch.setattr(interruption.sys, "argv", ["robojackson", "train", "a.parquet", *words])
+    trained = TrainedPolicy(Policy((), {}), None, TrainConfig(), [], 64, 0, 1.0, "steps", {})  # type: ignore[arg-type]
+    answer = training_process._answer(trained, Path("a.parquet"), Path("policy.safetensors"), None)
+    assert answer["next"] == "robojackson train a.parquet --minutes 10"
 
 
 def test_after_a_training_signals_are_what_they_were(tmp_path: Path) -> None:

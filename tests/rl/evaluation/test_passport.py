@@ -60,6 +60,23 @@ def test_every_case_differs_from_the_nominal_one(robot: Robot) -> None:
         assert (case.variation, case.conditions) != (plain.variation, plain.conditions), case.name
 
 
+def test_a_policy_that_commands_torques_has_only_cases_that_reach_it(
+    robot: Robot, sway: ReferenceMotion
+) -> None:
+    """Gains and sensor noise were rows, too, with the figures of the nominal one."""
+    size = robot.model.nu
+    weights = 0.05 * np.random.default_rng(0).normal(size=(348, size))
+    facts = {"robot": "humanoid", "mode": "paper", "control": {"law": "torque"}}
+    policy = Policy(((weights, np.zeros(size)),), facts)
+    config = EvaluateConfig(seconds=0.6, phases=2, resets=1)
+    found = {row["case"]: row["site_error_m"] for row in passport(policy, sway, robot, config)}
+    missing = [case.name for case in cases(robot, 0) if case.name not in found]
+    assert missing == ["gains x 0.8", "gains x 1.2", "sensor noise"]
+    nominal = found.pop(NOMINAL)
+    same = [case for case, error in found.items() if error == nominal]
+    assert same == ["pushes every 1 to 3 s"], "which come after a second"
+
+
 @pytest.mark.parametrize("timestep", [0.0025, 0.01])
 def test_a_delay_is_a_case_once(timestep: float, robot: Robot) -> None:
     """20 ms late was a control step late, as 10 ms."""
