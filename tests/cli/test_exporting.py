@@ -70,7 +70,19 @@ def test_the_answer_names_what_was_written(reference: Path, tmp_path: Path) -> N
 def test_the_answer_rates_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
     result = export(reference, "csv", tmp_path / "motion.csv")
     assert result["verdict"]["kind"] == "feasible"
-    assert result["next"] == command_line("train", reference, "-o", reference.parent / "training")
+    assert "next" not in result, "another program trains on the file"
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("to", sorted({*registry.robot_exporters()} - {"gltf"}))
+def test_the_answer_counts_the_frames_of_the_file(
+    to: str, reference: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "motion"
+    result = export(reference, to, out)
+    found = READERS[to](out.read_bytes())
+    assert "steps" not in result
+    assert (result["frames"], result["fps"]) == (len(found), pytest.approx(found.fps, rel=1e-4))
 
 
 @pytest.mark.medium
