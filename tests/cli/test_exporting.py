@@ -75,9 +75,7 @@ def test_the_answer_rates_the_motion_by_its_score_card(reference: Path, tmp_path
 
 @pytest.mark.medium
 @pytest.mark.parametrize("to", sorted({*registry.robot_exporters()} - {"gltf"}))
-def test_the_answer_counts_the_frames_of_the_file(
-    to: str, reference: Path, tmp_path: Path
-) -> None:
+def test_the_answer_counts_the_frames_of_the_file(to: str, reference: Path, tmp_path: Path) -> None:
     out = tmp_path / "motion"
     result = export(reference, to, out)
     found = READERS[to](out.read_bytes())
