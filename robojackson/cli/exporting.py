@@ -71,7 +71,7 @@ def export(
     require_another(source, out)
     if tracker:
         raise BadConfiguration(f"tracker {str(source)!r} can be written as {DEPLOY} alone")
-    require_file(source)
+    require_file(source, usual=("reference.parquet", "smpl.parquet", "policy.safetensors"))
     about: dict[str, Any]
     if source.suffix == POLICY_SUFFIX:
         from robojackson.api.foreign_files import write_policy

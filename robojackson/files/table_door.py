@@ -22,6 +22,12 @@ from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """The command that writes each table that other commands read."""
+NAMES = {
+    "LandmarkTrack": ("landmarks.parquet",),
+    "SmplSequence": ("smpl.parquet",),
+    "ReferenceMotion": ("reference.parquet",),
+}
+"""The name that each of these tables has in the folder of a stage."""
 MOST_NUMBERS = 2**25
 """Largest number of values in one table, nulls included: 17 minutes of SMPL at 120 frames a
 second."""

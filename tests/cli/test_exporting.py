@@ -148,6 +148,12 @@ def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
         export(path, "csv", tmp_path / "motion.csv")
 
 
+@pytest.mark.medium
+def test_a_folder_is_refused_with_the_motion_in_it(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"did you mean .*/reference\.parquet\?"):
+        export(reference.parent, "csv", tmp_path / "motion.csv")
+
+
 def test_a_missing_reference_is_reported(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="no such file"):
         export(tmp_path / "reference.parquet", "csv", tmp_path / "motion.csv")
