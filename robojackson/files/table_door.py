@@ -22,6 +22,7 @@ from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """The command that writes each table that other commands read."""
+POLICY_FIRST = "the policy comes first: `robojackson evaluate POLICY REFERENCE`"
 NAMES = {
     "LandmarkTrack": ("landmarks.parquet",),
     "SmplSequence": ("smpl.parquet",),
@@ -69,7 +70,7 @@ def _parquet(data: bytes, where: str | Path) -> Iterator[None]:
         yield
     except (pa.ArrowException, OSError, ValueError) as cause:
         if kind := kind_of(data):
-            order = "; in which order does --help list the arguments?" if kind == NETWORKS else ""
+            order = f"; {POLICY_FIRST}" if kind == NETWORKS else ""
             raise BadTable(f"{kind}, not a table (Parquet){order}", where) from cause
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"not a Parquet file ({reason})", where) from cause
