@@ -87,6 +87,8 @@ def train_policy(
         trainer.start_from(started.tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
+    if run.finished() and newest_checkpoint(out) is not None:
+        log.warning("no step is added: the %s are used up; give a larger budget", run.finished())
     try:
         if not run.finished():
             _learn(trainer, run)
