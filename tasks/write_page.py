@@ -20,7 +20,7 @@ from robojackson.report.pages.evaluation_text import beat_rows
 from robojackson.report.pages.live_page import live_page
 from robojackson.report.pages.run_page import PageCandidate
 from robojackson.report.video.film import VideoConfig
-from robojackson.report.web.live_data import runs_in_a_browser
+from robojackson.report.web.live_data import why_not_live
 from robojackson.report.web.shown_run import RecordedRun, ShownRun, shown_run, thumbnail
 from robojackson.rl.evaluation.controllers import Evaluated
 from robojackson.rl.policy import load_policy
@@ -32,6 +32,7 @@ from storage.store import Store
 from tasks.probe_video import info_of
 from tasks.render_video import music_digest
 from tasks.runtime.code_digest import template_digests
+from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import stage
 
 if TYPE_CHECKING:
@@ -149,6 +150,8 @@ def _written(
     if live is not None:
         files["live"] = store.put(f"{folder}/{LIVE}", live.encode())
         results = replace(results, live=LIVE)
+    elif "dance" in made:
+        run_logger().info("no live page: %s", why_not_live(run.policy, run.robot))
     text = render(page_content(results, made["dance"].name if "dance" in made else None))
     kept = {
         name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
@@ -181,11 +184,8 @@ def _dancer(store: Store, made: Mapping[str, Artifact]) -> Evaluated | None:
         with store.local(made["policy"]) as path:
             return load_policy(path)
     name = _json(store, made["evaluation"]).get("tracker")
-    description = None if name is None else describe_tracker(name)
-    if description is None or description.network not in IN_BROWSERS:
-        return None
-    tracker = open_tracker(description)
-    return tracker if runs_in_a_browser(tracker) else None
+    found = None if name is None else describe_tracker(name)
+    return open_tracker(found) if found and found.network in IN_BROWSERS else None
 
 
 def _results(

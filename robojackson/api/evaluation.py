@@ -32,6 +32,7 @@ from robojackson.motion.rollout import Rollout
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.pipeline.run_names import motion_name, run_labels
 from robojackson.pipeline.table_schemas import EVALUATION_RECORD
+from robojackson.pipeline.tracker_descriptions import require_for
 from robojackson.report.video.side_by_side import TRAINED_TITLE, VideoConfig, side_by_side
 from robojackson.rl.config.evaluate_config import EvaluateConfig
 from robojackson.rl.evaluation import policy_evaluation
@@ -117,6 +118,8 @@ def evaluate_policy(
     motion = read_if_path(ReferenceMotion, reference)
     machine = robot_of(motion) if robot is None else require_robot(motion, load_robot(robot))
     trained = _policy_of(policy)
+    if not isinstance(trained, Policy):
+        require_for(trained.description, machine.description.name)
     with counter(progress is True, "evaluation") as count:
         notify: PartProgress = (lambda name, done, total: None) if progress is False else progress  # type: ignore[assignment]
         if count is not None:

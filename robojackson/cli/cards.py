@@ -104,7 +104,7 @@ def retarget_lines(answer: Answer) -> list[str]:
         figure = f"{value:.{digits}f} {unit}"
         rows.append(f"{words:<25} {figure:<18} {bar(value, limit)} at most {limit:g}")
     rows += [f"finding                   {finding}" for finding in card.get("findings", ())[:3]]
-    rows += [f"{key:<25} {answer[key]}" for key in ("reference", "picture", "video")
+    rows += [f"{key:<25} {answer[key]}" for key in ("reference", "picture", "video", "hint")
               if key in answer]  # fmt: skip
     return [*rows, *closing(answer)]
 

@@ -22,6 +22,7 @@ from robojackson.formats import registry
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.retarget.scorecard_gate import BARS, scorecard_record
+from robojackson.robot.sampling import frame_count
 
 POLICY_SUFFIX, LEAST_STRICT = ".safetensors", 0.9
 DEPLOY = "deploy"
@@ -70,7 +71,7 @@ def export(
     require_another(source, out)
     if tracker:
         raise BadConfiguration(f"tracker {str(source)!r} can be written as {DEPLOY} alone")
-    require_file(source)
+    require_file(source, usual=("reference.parquet", "smpl.parquet", "policy.safetensors"))
     about: dict[str, Any]
     if source.suffix == POLICY_SUFFIX:
         from robojackson.api.foreign_files import write_policy
@@ -86,7 +87,7 @@ def export(
         if isinstance(motion, SmplSequence):
             about = {"frames": len(motion), "fps": motion.fps, **_person_verdict(motion, to, out)}
         else:
-            about = {"robot": motion.robot, "steps": len(motion)}
+            about = {"robot": motion.robot, **_frames(motion, to)}
             about |= _robot_verdict(motion, source)
     figures = {"file": str(out), "format": to, **about, "bytes": out.stat().st_size}
     return figures | {"seconds": time.monotonic() - began}
@@ -172,6 +173,12 @@ def _person_verdict(motion: SmplSequence, to: str, out: Path) -> dict[str, objec
     return verdict | {"next": cards.command_line("import", out, "-o", folder)}
 
 
+def _frames(motion: ReferenceMotion, to: str) -> dict[str, float]:
+    """Return number and rate of the frames in the file of a robot's motion."""
+    fps = registry.robot_exporters()[to].fps
+    return {"frames": frame_count(motion, fps), "fps": fps or 1.0 / motion.dt}
+
+
 def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:
     """Return the verdict on a robot's motion from its own score card, which an export does not
     change."""
@@ -180,13 +187,8 @@ def _robot_verdict(motion: ReferenceMotion, source: Path) -> dict[str, object]:
     if not set(BARS) & set(card):
         sentence = "The motion has no score card: no check that the robot can do it was made."
         verdict = {"kind": "unchecked", "sentence": sentence}
-    if verdict["kind"] == "feasible":
-        return {
-            "verdict": verdict,
-            "next": cards.command_line("train", source, "-o", folder / "training"),
-        }
     person, robot = folder / "smpl.parquet", motion.robot_file or motion.robot
-    if not person.is_file():
+    if verdict["kind"] == "feasible" or not person.is_file():
         return {"verdict": verdict}
     words = ("retarget", person, "-o", folder, "--robot", robot)
     return {"verdict": verdict, "next": cards.command_line(*words)}

@@ -137,9 +137,10 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
     """Write reference.parquet and scorecard.json of a motion, good or bad; `gate` evaluates it."""
     from robojackson.api.motions import retarget_motion
     from robojackson.api.robots import load_robot
+    from robojackson.cli.training_words import next_of_retargeting
     from robojackson.motion.smpl_sequence import SmplSequence
     from robojackson.pipeline.pipeline_config import PipelineConfig
-    from robojackson.retarget.scorecard_gate import failures, scorecard_record
+    from robojackson.retarget.scorecard_gate import scorecard_record
 
     began = time.monotonic()
     settings = load(PipelineConfig, config, overrides)
@@ -162,10 +163,7 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
         "cyclic": reference.cyclic,
         "scorecard": scorecard,
         "verdict": cards.retarget_verdict(scorecard),
-        "next": cards.command_line(
-            *("train", out / "reference.parquet", "-o", out / "training"),
-            *(["--force"] if failures(scorecard) else []),
-        ),
+        **next_of_retargeting(out / "reference.parquet", robot, settings.train),
         "seconds": time.monotonic() - began,
     }
 

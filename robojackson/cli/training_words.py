@@ -16,7 +16,9 @@ from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.evaluation.verdict import longer_minutes
 from robojackson.rl.policy import load_policy
 from robojackson.rl.policy_facts import is_of_another_motion, recorded_law
+from robojackson.rl.sim.trainable import require_trainable
 from robojackson.rl.training_task import completed_settings
+from robojackson.robot.model import Robot
 
 CHOICES = ("mode", "tqc.preset", "paper.preset")
 """Settings that decide the defaults of others, each before those that it decides."""
@@ -30,6 +32,16 @@ def train_this(reference: Path, robot: str | None = None) -> str:
     """
     words = ("train", reference, "-o", reference.parent / "training")
     return cards.command_line(*words, *cards.of_robot(robot), *_forced(reference))
+
+
+def next_of_retargeting(reference: Path, robot: Robot, config: TrainConfig) -> dict[str, str]:
+    """Return the command that trains a policy of a motion that was just written, as `next`; as
+    `hint` what must be mended first, where no training on the robot is possible."""
+    try:
+        require_trainable(robot, config)
+    except BadConfiguration as cause:
+        return {"hint": str(cause)}
+    return {"next": train_this(reference)}
 
 
 def train_after(policy: Path, reference: Path, minutes: float, robot: str | None = None) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,7 +17,10 @@ VIDEO = re.compile(rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI ", re.DOTALL)
 
 
 def require_file(
-    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+    path: Path,
+    error: type[RoboJacksonError] = StoreError,
+    largest: int = LARGEST,
+    usual: Sequence[str] = (),
 ) -> None:
     """Raise an error for a path that cannot be read as one file.
 
@@ -24,12 +28,14 @@ def require_file(
         path: The file.
         error: Class of the error.
         largest: Largest allowed size, bytes.
+        usual: Names that such a file has in the folder of a stage, the likeliest first.
 
     Raises:
         RoboJacksonError: the path is a folder, a device or a pipe, missing, or too large.
     """
     if path.is_dir():
-        raise error("a folder, not a file", path)
+        meant = next((each for name in usual if (each := path / name).is_file()), None)
+        raise error(f"a folder, not a file{f'; did you mean {meant}?' if meant else ''}", path)
     if not path.is_file():
         raise error("no such file" if not path.exists() else "a device or a pipe, not a file", path)
     if (size := path.stat().st_size) > largest:
@@ -37,14 +43,17 @@ def require_file(
 
 
 def read_file(
-    path: Path, error: type[RoboJacksonError] = StoreError, largest: int = LARGEST
+    path: Path,
+    error: type[RoboJacksonError] = StoreError,
+    largest: int = LARGEST,
+    usual: Sequence[str] = (),
 ) -> bytes:
     """Return the content of a file, checked by `require_file`.
 
     Raises:
         RoboJacksonError: the file cannot be read.
     """
-    require_file(path, error, largest)
+    require_file(path, error, largest, usual)
     try:
         return path.read_bytes()
     except OSError as cause:

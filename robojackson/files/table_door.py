@@ -22,6 +22,13 @@ from robojackson.files.table_types import Column, Facts, TableSchema
 
 MAKERS = {"SmplSequence": "mocap", "ReferenceMotion": "retarget"}
 """The command that writes each table that other commands read."""
+POLICY_FIRST = "the policy comes first: `robojackson evaluate POLICY REFERENCE`"
+NAMES = {
+    "LandmarkTrack": ("landmarks.parquet",),
+    "SmplSequence": ("smpl.parquet",),
+    "ReferenceMotion": ("reference.parquet",),
+}
+"""The name that each of these tables has in the folder of a stage."""
 MOST_NUMBERS = 2**25
 """Largest number of values in one table, nulls included: 17 minutes of SMPL at 120 frames a
 second."""
@@ -63,7 +70,7 @@ def _parquet(data: bytes, where: str | Path) -> Iterator[None]:
         yield
     except (pa.ArrowException, OSError, ValueError) as cause:
         if kind := kind_of(data):
-            order = "; in which order does --help list the arguments?" if kind == NETWORKS else ""
+            order = f"; {POLICY_FIRST}" if kind == NETWORKS else ""
             raise BadTable(f"{kind}, not a table (Parquet){order}", where) from cause
         reason = " ".join(str(cause).split())[:120]
         raise BadTable(f"not a Parquet file ({reason})", where) from cause

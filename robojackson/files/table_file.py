@@ -11,6 +11,7 @@ from robojackson.files import tables
 from robojackson.files.file_tree import results_in
 from robojackson.files.foreign_file import read_file
 from robojackson.files.json_types import to_json_types
+from robojackson.files.table_door import NAMES
 from robojackson.files.table_types import Facts as Facts
 from robojackson.files.table_types import TableSchema
 
@@ -71,7 +72,7 @@ class TableFile:
             BadTable: not Parquet, another table, or a column or metadata key that is wrong.
         """
         file = Path(path)
-        return cls.from_bytes(read_file(file), str(file))
+        return cls.from_bytes(read_file(file, usual=NAMES.get(cls.SCHEMA.name, ())), str(file))
 
 
 def numbered(index: str, rows: int, period_s: float) -> Columns:

@@ -63,4 +63,4 @@ def read(data: bytes) -> SampledMotion:
         return SampledMotion(float(arrays["fps"].ravel()[0]), qpos)
 
 
-EXPORT = RobotExporter("beyondmimic", write)
+EXPORT = RobotExporter("beyondmimic", write, FPS)

@@ -34,15 +34,17 @@ class RobotExporter:
     Attributes:
         name: Value of `robojackson export --to`.
         write: Function that returns the content of a file.
+        fps: Frames a second of its files; None where they have the motion's control steps.
     """
 
     name: str
     write: Callable[[ReferenceMotion, "MjModel"], bytes]
+    fps: float | None = None
 
 
 @dataclass(frozen=True)
 class PersonExporter:
-    """A format of human motions; attributes as those of `RobotExporter`."""
+    """A format of human motions; name and function as those of `RobotExporter`."""
 
     name: str
     write: Callable[[SmplSequence], bytes]
@@ -72,7 +74,7 @@ class PolicyNetwork(Protocol):
 
 @dataclass(frozen=True)
 class PolicyExporter:
-    """A format of policies; attributes as those of `RobotExporter`."""
+    """A format of policies; name and function as those of `RobotExporter`."""
 
     name: str
     write: Callable[[PolicyNetwork], bytes]

@@ -70,4 +70,4 @@ class _Portable(pickle.Pickler):
         return np.ndarray, ((0,),), value.__reduce__()[2]
 
 
-EXPORT = RobotExporter("gmr", write)
+EXPORT = RobotExporter("gmr", write, FPS)

@@ -29,4 +29,4 @@ def read(data: bytes) -> SampledMotion:
         return SampledMotion(float(arrays["fps"]), arrays["qpos"])
 
 
-EXPORT = RobotExporter("omniretarget", lambda reference, _: write(reference))
+EXPORT = RobotExporter("omniretarget", lambda reference, _: write(reference), FPS)

@@ -41,4 +41,4 @@ def read(data: bytes, fps: float = FPS) -> SampledMotion:
     return SampledMotion(float(fps), rows)
 
 
-EXPORT = RobotExporter("csv", lambda reference, _: write(reference))
+EXPORT = RobotExporter("csv", lambda reference, _: write(reference), FPS)

@@ -43,6 +43,20 @@ def trackers_of(robot: str) -> list[TrackerDescription]:
     return [each for each in map(describe_tracker, tracker_names()) if each.robot == robot]
 
 
+def require_for(tracker: TrackerDescription, robot: str) -> None:
+    """Raise for a tracker of another robot.
+
+    Raises:
+        BadPolicy: the message lists the trackers of the robot.
+    """
+    if tracker.robot != robot:
+        own = ", ".join(each.name for each in trackers_of(robot)) or "none"
+        raise BadPolicy(
+            f"tracker {tracker.name!r} drives robot {tracker.robot!r}, not {robot!r}; for {robot}: "
+            f"{own}"
+        )
+
+
 def default_trackers(robot: str) -> list[TrackerDescription]:
     """Return the trackers of a robot that may be selected where none is named."""
     return [each for each in trackers_of(robot) if each.by_default]
@@ -79,8 +93,7 @@ def require_tracker(robot: str, name: str | None = None) -> TrackerDescription |
     if name is None:
         here = [each for each in here if has_runtime() or not needs_runtime(each)] or here
     chosen = min(here, key=lambda each: each.fallback)
-    if chosen.robot != robot:
-        raise BadPolicy(f"tracker {name!r} drives robot {chosen.robot!r}, not {robot!r}")
+    require_for(chosen, robot)
     if require_file(chosen) is not None and needs_runtime(chosen):
         require_runtime()
     return chosen

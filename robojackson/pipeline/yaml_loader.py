@@ -177,7 +177,9 @@ def _explain(cls: type, cause: ValidationError) -> str:
     where = ".".join(path) or cls.__name__
     if error["type"] in UNEXPECTED:
         known = _keys_at(cls, path[:-1])
-        close = difflib.get_close_matches(path[-1], known, 1) or _elsewhere(cls, path[-1])
+        close = _elsewhere(cls, path[-1], error["input"]) or difflib.get_close_matches(
+            path[-1], known, 1
+        )
         hint = f" Did you mean {close[0]!r}?" if close else ""
         return f"unknown key {where!r}.{hint} Known: {', '.join(known)}"
     if error["type"] in ("missing", "missing_argument"):
@@ -213,10 +215,19 @@ def _is_branch(part: int | str) -> bool:
     return isinstance(part, str) and ("[" in part or part == "dataclass")
 
 
-def _elsewhere(cls: type, key: str) -> list[str]:
-    """Return the path of a key in a section of a configuration, if only one section has it."""
-    found = [f"{section}.{key}" for section in _keys_at(cls, []) if key in _keys_at(cls, [section])]
-    return found if len(found) == 1 else []
+def _elsewhere(cls: type, key: str, value: object) -> list[str]:
+    """Return the path of a key in a section of a configuration, if only one section has it, with
+    the keys of its value as far as it has one alone, `track: {reward: {hands: 0.4}}`."""
+    found = [[section, key] for section in _keys_at(cls, []) if key in _keys_at(cls, [section])]
+    if len(found) != 1:
+        return []
+    path = found[0]
+    while isinstance(value, Mapping) and len(value) == 1:
+        key, value = next(iter(value.items()))
+        if key not in _keys_at(cls, path):
+            break
+        path.append(key)
+    return [".".join(path)]
 
 
 def _keys_at(cls: Any, path: list[str]) -> list[str]:

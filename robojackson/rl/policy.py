@@ -130,7 +130,7 @@ def load_policy(path: Path) -> Policy:
     Raises:
         BadPolicy: the file is missing, foreign or has layers that do not fit each other.
     """
-    require_file(path, BadPolicy)
+    require_file(path, BadPolicy, usual=("policy.safetensors",))
     try:
         with path.open("rb") as start:
             if start.read(len(PARQUET)) == PARQUET:

@@ -87,6 +87,8 @@ def train_policy(
         trainer.start_from(started.tensors)
     run.bind(trainer)
     choice = _choice(tqc, config, reference, robot, core)
+    if run.finished() and newest_checkpoint(out) is not None:
+        log.warning("no step is added: the %s are used up; give a larger budget", run.finished())
     try:
         if not run.finished():
             _learn(trainer, run)
@@ -96,7 +98,9 @@ def train_policy(
         run.checkpoint(choice)
     finally:
         env.close()
-    return run.result()
+    result = run.result()
+    _warn_of_no_learning(tqc, config.steps, result.steps)
+    return result
 
 
 def _learn(trainer: Trainer, run: Run) -> None:
@@ -153,6 +157,21 @@ def _warn_of_short_budget(tqc: TqcConfig, steps: int | None) -> None:
             f"{burn_in:,}",
             f"{steps:,}",
         )
+
+
+def _warn_of_no_learning(tqc: TqcConfig, steps: int | None, done: int) -> None:
+    """Log a warning where a training ended before its actor learnt, unless its budget in steps
+    gave one at the beginning."""
+    start = tqc.actor_start
+    if done >= start.burn_in or (steps is not None and steps <= start.burn_in):
+        return
+    log.warning(
+        "the training ended after %s transitions, and until %s the critics learn alone "
+        "(tqc.burn_in): the policy is %s; give it more minutes",
+        f"{done:,}",
+        f"{start.burn_in:,}",
+        "the feedback alone" if start.zero_init else "as it began",
+    )
 
 
 def _fitting(

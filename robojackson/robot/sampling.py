@@ -65,6 +65,11 @@ def sampled(reference: ReferenceMotion, fps: float | None = None) -> SampledMoti
     return SampledMotion(float(fps), resample(qpos, steps, cycle_offset), qvel)
 
 
+def frame_count(reference: ReferenceMotion, fps: float | None = None) -> int:
+    """Return the number of frames that `sampled` returns."""
+    return len(reference) if fps is None else len(_steps(reference, fps))
+
+
 def _steps(reference: ReferenceMotion, fps: float) -> Float[np.ndarray, " T"]:
     """Return the fractional steps of the frames: up to the last step, or all before the next cycle
     begins."""

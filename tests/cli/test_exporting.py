@@ -70,7 +70,17 @@ def test_the_answer_names_what_was_written(reference: Path, tmp_path: Path) -> N
 def test_the_answer_rates_the_motion_by_its_score_card(reference: Path, tmp_path: Path) -> None:
     result = export(reference, "csv", tmp_path / "motion.csv")
     assert result["verdict"]["kind"] == "feasible"
-    assert result["next"] == command_line("train", reference, "-o", reference.parent / "training")
+    assert "next" not in result, "another program trains on the file"
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("to", sorted({*registry.robot_exporters()} - {"gltf"}))
+def test_the_answer_counts_the_frames_of_the_file(to: str, reference: Path, tmp_path: Path) -> None:
+    out = tmp_path / "motion"
+    result = export(reference, to, out)
+    found = READERS[to](out.read_bytes())
+    assert "steps" not in result
+    assert (result["frames"], result["fps"]) == (len(found), pytest.approx(found.fps, rel=1e-4))
 
 
 @pytest.mark.medium
@@ -136,6 +146,12 @@ def test_a_reference_of_another_model_is_refused(tmp_path: Path) -> None:
     path.write_bytes(tables.encode(replace(robot_motion("hip_shake"), model_sha256="0" * 64)))
     with pytest.raises(RejectedReference):
         export(path, "csv", tmp_path / "motion.csv")
+
+
+@pytest.mark.medium
+def test_a_folder_is_refused_with_the_motion_in_it(reference: Path, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"did you mean .*/reference\.parquet\?"):
+        export(reference.parent, "csv", tmp_path / "motion.csv")
 
 
 def test_a_missing_reference_is_reported(tmp_path: Path) -> None:

@@ -1,11 +1,12 @@
 """A robot that is given by its file, through the commands of one stage."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from robojackson.cli import exporting, stages
+from robojackson.cli import cards, exporting, stages
 from robojackson.cli.learning import training_process, walker_training
 from robojackson.cli.options import yaml_text
 from robojackson.errors import BadConfiguration, RejectedReference, UnknownName
@@ -78,6 +79,19 @@ def test_a_motion_that_does_not_name_the_file_says_so(made: Made, tmp_path: Path
         UnknownName, match=r"'mine' .*does not name its description.*give --robot FILE"
     ):
         exporting.export(path, "gmr", tmp_path / "m.pkl")
+
+
+@pytest.mark.medium
+def test_a_robot_with_unstable_gains_is_retargeted_without_a_training_next(tmp_path: Path) -> None:
+    robot = own_robot(tmp_path)
+    text = re.sub(r"(?m)^damping:.*\n(  .*\n)+", "damping: {'*': 900.0}\n", robot.read_text())
+    robot.write_text(text)
+    human("hip_shake").save(tmp_path / "smpl.parquet")
+    overrides = {"robot": yaml_text(str(robot))}
+    result = stages.retarget(tmp_path / "smpl.parquet", tmp_path, "smoke", overrides)
+    assert "next" not in result
+    assert "mine.yaml: damping: the gains of" in result["hint"]
+    assert any("the gains of" in line for line in cards.retarget_lines(result))
 
 
 @pytest.mark.medium

@@ -48,7 +48,11 @@ def test_a_kind_is_known_by_the_first_bytes(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("safetensors", "order"), ("json", "JSON, not a table")]
+    ("name", "words"),
+    [
+        ("safetensors", "the policy comes first: `robojackson evaluate POLICY REFERENCE`"),
+        ("json", "JSON, not a table"),
+    ],
 )
 def test_a_table_that_is_something_else_is_refused_by_what_it_is(name: str, words: str) -> None:
     with pytest.raises(BadTable, match=words):

@@ -1,6 +1,7 @@
 """What is written is read back, and a file that violates its schema is refused by column."""
 
 import io
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from robojackson.clips.quality.stability import Stability
-from robojackson.errors import BadTable
+from robojackson.errors import BadTable, StoreError
 from robojackson.files import table_door, tables
 from robojackson.motion.landmark_track import LANDMARK_TRACK, LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
@@ -273,3 +274,21 @@ def test_an_empty_table_has_all_columns() -> None:
 def test_every_measured_column_has_a_unit(schema) -> None:
     plain = {"frame", "contact", "valid"}
     assert [c.name for c in schema.columns if not c.unit and c.name not in plain] == []
+
+
+@pytest.mark.parametrize(
+    ("table", "name"),
+    [
+        (LandmarkTrack, "landmarks.parquet"),
+        (SmplSequence, "smpl.parquet"),
+        (ReferenceMotion, "reference.parquet"),
+    ],
+)
+def test_a_folder_in_place_of_a_table_is_refused_with_the_file_in_it(
+    table: type[LandmarkTrack | SmplSequence | ReferenceMotion], name: str, tmp_path: Path
+) -> None:
+    with pytest.raises(StoreError, match=r"a folder, not a file$"):
+        table.load(tmp_path)
+    (tmp_path / name).touch()
+    with pytest.raises(StoreError, match=rf"did you mean {re.escape(str(tmp_path / name))}\?$"):
+        table.load(tmp_path)

@@ -326,6 +326,18 @@ def test_a_key_of_one_section_is_found_there() -> None:
         yaml_loader.load(PipelineConfig, "base", {"phases": 24})
 
 
+@pytest.mark.parametrize("inner", ["reward", "reward.hands"])
+def test_a_path_of_one_section_is_found_there_before_a_similar_key(inner: str) -> None:
+    with pytest.raises(BadConfiguration) as caught:
+        yaml_loader.load(PipelineConfig, "base", {f"track.{inner}": {} if inner == "reward" else 1})
+    assert f"Did you mean 'train.track.{inner}'?" in str(caught.value)
+
+
+def test_a_path_is_suggested_as_far_as_there_is_one() -> None:
+    with pytest.raises(BadConfiguration, match=r"Did you mean 'train\.track\.reward'\?"):
+        yaml_loader.load(PipelineConfig, "base", {"track.reward.hats": 1})
+
+
 def test_a_value_that_a_rule_of_ours_refuses_is_explained_by_the_rule_alone() -> None:
     with pytest.raises(BadConfiguration, match=r"'tqc.entropy' is 'auto_0': auto_0 begins at zero"):
         yaml_loader.load(TrainConfig, None, {"tqc.entropy": "auto_0"})

@@ -57,7 +57,10 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_called_a_folder(tmp_path: Path) -> None:
-    with pytest.raises(BadPolicy, match="a folder, not a file"):
+    with pytest.raises(BadPolicy, match=r"a folder, not a file$"):
+        load_policy(tmp_path)
+    (tmp_path / "policy.safetensors").touch()
+    with pytest.raises(BadPolicy, match=r"a file; did you mean .*/policy\.safetensors\?"):
         load_policy(tmp_path)
 
 

@@ -17,7 +17,7 @@ from robojackson.rl.config.train_config import TqcConfig, TrackConfig, TrainConf
 from robojackson.rl.evaluation.reward_audit import audit_both_readings, audit_record
 from robojackson.rl.policy_facts import fact
 from robojackson.rl.polish import paid_environment, polishes, residual_learning, sharper
-from robojackson.rl.training import _warn_of_short_budget
+from robojackson.rl.training import _warn_of_no_learning, _warn_of_short_budget, train_policy
 from robojackson.robot.model import Robot
 
 
@@ -102,6 +102,37 @@ def test_a_budget_in_which_the_actor_never_learns_is_reported(
 ) -> None:
     _warn_of_short_budget(replace(configured().tqc, burn_in=40), steps)
     assert ("for 40 transitions (tqc.burn_in) and the budget is 40" in caplog.text) == is_short
+
+
+@pytest.mark.parametrize(
+    ("steps", "done", "words"),
+    [
+        (None, 39, "after 39 transitions, and until 40"),
+        (100, 39, "the policy is the feedback alone; give it more minutes"),
+        (None, 40, ""),
+        (40, 39, ""),  # a warning came before
+    ],
+)
+def test_a_training_that_ended_before_its_actor_learnt_is_reported(
+    steps: int | None, done: int, words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    tqc = replace(configured().tqc, zero_init=True, burn_in=40)
+    _warn_of_no_learning(tqc, steps, done)
+    assert words in caplog.text
+    assert bool(caplog.text) == bool(words)
+
+
+@pytest.mark.slow
+def test_a_time_budget_that_is_over_before_the_burn_in_is_reported(
+    robot: Robot, sway: ReferenceMotion, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    tqc = TqcConfig(
+        preset="polish", n_envs=2, warmup=8, batch=16, buffer=1000, actor=(8, 8), critic=(8, 8)
+    )
+    config = replace(configured(), steps=None, minutes=1e-6, tqc=tqc)
+    result = train_policy(sway, robot, config, tmp_path / "out")
+    assert result.steps < 50_000
+    assert "until 50,000 the critics learn alone (tqc.burn_in): the policy is" in caplog.text
 
 
 def test_a_motion_that_repeats_is_learnt_from_falls(fed: Robot, sway: ReferenceMotion) -> None:

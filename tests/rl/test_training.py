@@ -199,6 +199,15 @@ def test_a_finished_run_given_more_steps_goes_on(
 
 
 @pytest.mark.medium
+def test_a_finished_run_with_the_same_budget_reports_that_no_step_is_added(
+    trained: tuple, robot: Robot, sway: ReferenceMotion, caplog: pytest.LogCaptureFixture
+) -> None:
+    result, _, _, name = trained
+    run(robot, sway, brief(name), result.policy.parent)
+    assert "no step is added: the steps are used up; give a larger budget" in caplog.text
+
+
+@pytest.mark.medium
 @pytest.mark.parametrize(("polish", "pushes"), [(True, 0.0), (False, 0.0), (True, 1.0)])
 def test_a_polish_on_stock_physics_is_written_by_what_was_chosen_and_no_other_training(
     robot: Robot,

@@ -27,7 +27,7 @@ ROOM = 1.35
 
 
 def live_page(run: RecordedRun, title: str) -> str | None:
-    """Return the page; None where a browser cannot run the policy or the robot (`live_data`)."""
+    """Return the page; None where a browser cannot run the policy or the robot (`why_not_live`)."""
     if run.policy is None:
         return None
     data = live_data(run.policy, run.reference, run.robot)

@@ -45,16 +45,10 @@ LARGEST, TINY = 32767, 1e-30
 def live_data(
     policy: Evaluated, reference: ReferenceMotion, robot: Robot
 ) -> dict[str, object] | None:
-    """Return the data of a live dance; None where a browser cannot run it.
-
-    A browser cannot run a policy of the paper's mode, a tracker whose network is a file of another
-    project, feedback with a network of many motions on top, or a robot whose meshes collide.
-    """
-    if not runs_in_a_browser(policy):
+    """Return the data of a live dance; None where a browser cannot run it (`why_not_live`)."""
+    if why_not_live(policy, robot):
         return None
     control, network = shown_control(policy, robot), _network(policy)
-    if control.law != "pd" or _has_colliding_meshes(robot.model):
-        return None
     seen = None if network is None else observation_of(network)
     motors, (kp, kd) = Motors.of(robot.model), gains(robot, control)
     lead, fall = lead_of(robot, reference, control), Fall.of(robot)
@@ -101,13 +95,19 @@ def live_data(
     }  # fmt: skip
 
 
-def runs_in_a_browser(policy: Evaluated) -> bool:
-    """Return whether a policy's network is one of ours without extras, or it has none."""
-    if isinstance(policy, Policy):
-        return mode_of(policy) == "track"
-    if isinstance(policy, RegulatorTracker):
-        return policy.policy is None
-    return isinstance(policy, PolicyTracker)
+def why_not_live(policy: Evaluated | None, robot: Robot) -> str:
+    """Return why a browser cannot run a dance; empty where it can."""
+    if not isinstance(policy, Policy | RegulatorTracker | PolicyTracker):
+        return "a browser cannot run the network of another project"
+    if isinstance(policy, Policy) and mode_of(policy) != "track":
+        return "a browser cannot run a policy of the paper's mode"
+    if isinstance(policy, RegulatorTracker) and policy.policy is not None:
+        return "a browser cannot run feedback with a network of many motions on top"
+    if (law := shown_control(policy, robot).law) != "pd":
+        return f"a browser cannot run the control law {law}"
+    if _has_colliding_meshes(robot.model):
+        return f"a browser cannot run robot {robot.description.name}, whose meshes collide"
+    return ""
 
 
 def _network(policy: Evaluated) -> Policy | None:

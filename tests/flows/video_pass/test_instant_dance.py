@@ -82,6 +82,14 @@ def test_the_page_names_the_tracker_and_was_there_before_the_whole_evaluation(
 
 
 @pytest.mark.slow
+def test_what_a_browser_cannot_run_is_reported_once(dances: Dances) -> None:
+    page, lines = Path(dances.instant.answer["page"]), dances.instant.err.splitlines()
+    assert not page.with_name("live.html").exists()
+    reason = "no live page: a browser cannot run the network of another project"
+    assert sum(reason in line for line in lines) == 1
+
+
+@pytest.mark.slow
 def test_a_recorded_instant_dance_is_answered_without_prefect(dances: Dances) -> None:
     again = dances.run(*SMALL, "--instant")
     assert (again.code, again.loaded_prefect) == (0, False)

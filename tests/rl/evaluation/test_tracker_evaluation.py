@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robojackson.api import evaluation
+from robojackson.api.trackers import load_tracker
 from robojackson.errors import BadPolicy
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.rl.config.evaluate_config import EvaluateConfig
@@ -19,6 +21,7 @@ from robojackson.rl.trackers.tracker import TrackerInput
 from robojackson.rl.trackers.tracker_description import TrackerDescription
 from robojackson.rl.trackers.twist2 import Twist2Tracker
 from robojackson.robot.model import Robot
+from tests.fixtures.robots import robot_motion
 from tests.fixtures.stand_in_tracker import stand_in
 
 FEW = EvaluateConfig(seconds=0.6, phases=2, resets=1, threads=1)
@@ -115,6 +118,12 @@ def test_the_passport_of_a_tracker_is_its_own_under_other_physics(
     cases = {row["case"]: row["site_error_m"] for row in found.summary["passport"]}
     assert len(cases) > 10
     assert cases["gains x 0.8"] != cases["nominal"]
+
+
+def test_a_tracker_of_another_robot_is_refused_with_those_of_the_motions() -> None:
+    regulator = load_tracker("regulator")
+    with pytest.raises(BadPolicy, match="'g1', not 'humanoid'; for humanoid: none"):
+        evaluation.evaluate_policy(regulator, robot_motion("hip_shake"))
 
 
 def test_a_motion_of_another_robot_is_one_line(

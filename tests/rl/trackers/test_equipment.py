@@ -80,6 +80,15 @@ def test_a_robot_without_a_tracker_is_one_line_that_lists_them() -> None:
         require_tracker("strong")
 
 
+def test_a_tracker_of_another_robot_is_one_line_that_lists_those_of_the_robot() -> None:
+    with pytest.raises(
+        BadPolicy, match=r"'regulator' drives robot 'g1', not 't1'; for t1: reg.*t1$"
+    ):
+        require_tracker("t1", "regulator")
+    with pytest.raises(BadPolicy, match=r"not 'strong'; for strong: none$"):
+        require_tracker("strong", "regulator")
+
+
 def test_none_is_no_tracker() -> None:
     assert require_tracker("strong", "none") is None
 
