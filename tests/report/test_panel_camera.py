@@ -91,6 +91,14 @@ def test_no_nearer_camera_has_every_point_in_its_panel() -> None:
         assert over.any() or pixels[:, 1].min() < -room[1] + canvas.strip_height(320, 480)
 
 
+def test_a_subject_whose_width_decides_is_in_the_middle_below_the_title() -> None:
+    points = np.random.default_rng(7).uniform((-0.1, -0.6, 0), (0.1, 0.6, 1.1), (400, 3))
+    framing = fit([Subject(points, 0.0)], 320, 480)
+    rows = view_of(np.zeros(2), 0.0, 320, 480, framing).project(points)[:, 1]
+    above, below = rows.min() - canvas.strip_height(320, 480), 480 - rows.max()
+    assert above == pytest.approx(below, rel=0.1)
+
+
 def test_without_a_subject_the_camera_stands_where_it_always_did() -> None:
     assert fit([], 320, 480) == Framing()
 

@@ -26,8 +26,8 @@ SMOOTHING_S = 0.5
 """Time constant of a following camera, seconds."""
 ROOM = 0.035
 """Margin on each side of the subject, share of the panel's height."""
-HEIGHTS = 256
-"""Heights that are tried."""
+HEIGHTS, NEARLY = 256, 1.02
+"""Heights that are tried; share of the least distance up to which a height is as good."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,8 @@ def fit(subjects: Sequence[Subject], width: int, height: int) -> Framing:
     """Return the nearest camera whose panel holds each subject at all times, below the title.
 
     Each edge of the panel requires a distance that is linear in the height of the point looked at:
-    focal * offset <= room * (distance + depth). The height with the least distance is used.
+    focal * offset <= room * (distance + depth). Of the heights with nearly the least distance, the
+    one that leaves the same room above and below is used: where the sides decide, many are.
 
     Args:
         width, height: Size of a panel, pixels.
@@ -118,17 +119,20 @@ def fit(subjects: Sequence[Subject], width: int, height: int) -> Framing:
         return Framing()
     level = np.concatenate([points[:, 2] for points, _ in known])
     heights = np.linspace(level.min(), level.max(), HEIGHTS)
-    needed = np.full(HEIGHTS, CLOSEST)
+    needed = np.full((4, HEIGHTS), CLOSEST)
     for points, azimuth_deg in known:
-        for normal in _edges(_axes(azimuth_deg), width, height):
-            needed = np.maximum(needed, (points @ normal).max() - heights * normal[2])
-    best = int(needed.argmin())
-    return Framing(float(needed[best]), float(heights[best]))
+        for edge, normal in enumerate(_edges(_axes(azimuth_deg), width, height)):
+            least = (points @ normal).max() - heights * normal[2]
+            needed[edge] = np.maximum(needed[edge], least)
+    distance, (below, above) = needed.max(0), needed[2:]
+    near = np.flatnonzero(distance <= NEARLY * distance.min())
+    best = int(near[np.abs(above - below)[near].argmin()])
+    return Framing(float(distance[best]), float(heights[best]))
 
 
 def _edges(axes: Float[np.ndarray, "3 3"], width: int, height: int) -> list[Float[np.ndarray, "3"]]:
-    """Return for each edge of a panel the distance that it requires, per metre of a point's
-    place."""
+    """Return for each edge of a panel (right, left, lower, upper) the distance that it requires,
+    per metre of a point's place."""
     room = ROOM * height
     beside = width / 2 - room
     below, above = height / 2 - room, height / 2 - room - strip_height(width, height)
