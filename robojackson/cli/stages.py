@@ -163,7 +163,7 @@ def retarget(smpl: Path, out: Path, config: str, overrides: Overrides) -> Figure
         "cyclic": reference.cyclic,
         "scorecard": scorecard,
         "verdict": cards.retarget_verdict(scorecard),
-        **next_of_retargeting(out / "reference.parquet", robot, settings.train),
+        **next_of_retargeting(out / "reference.parquet", scorecard, robot, settings.train),
         "seconds": time.monotonic() - began,
     }
 

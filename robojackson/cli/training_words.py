@@ -30,18 +30,23 @@ def train_this(reference: Path, robot: str | None = None) -> str:
     Args:
         robot: What `--robot` was given; None where the motion names its robot.
     """
-    words = ("train", reference, "-o", reference.parent / "training")
-    return cards.command_line(*words, *cards.of_robot(robot), *_forced(reference))
+    return _command(reference, *cards.of_robot(robot), *_forced_of(reference))
 
 
-def next_of_retargeting(reference: Path, robot: Robot, config: TrainConfig) -> dict[str, str]:
+def next_of_retargeting(
+    reference: Path, card: Mapping[str, float], robot: Robot, config: TrainConfig
+) -> dict[str, str]:
     """Return the command that trains a policy of a motion that was just written, as `next`; as
-    `hint` what must be mended first, where no training on the robot is possible."""
+    `hint` what must be mended first, where no training on the robot is possible.
+
+    Args:
+        card: Score card of the motion.
+    """
     try:
         require_trainable(robot, config)
     except BadConfiguration as cause:
         return {"hint": str(cause)}
-    return {"next": train_this(reference)}
+    return {"next": _command(reference, *_forced(card))}
 
 
 def train_after(policy: Path, reference: Path, minutes: float, robot: str | None = None) -> str:
@@ -62,17 +67,24 @@ def train_longer(reference: Path, folder: Path, minutes: float, robot: str | Non
             budget counts every sitting.
     """
     checkpoint = newest_checkpoint(folder)
-    state = json.loads("{}" if checkpoint is None else (checkpoint / "run.json").read_text())
+    state = {} if checkpoint is None else json.loads((checkpoint / "run.json").read_text())
     budget = math.ceil(max(minutes, longer_minutes(state.get("seconds", 0.0) / 60)))
     words = ("train", reference, "-o", folder, "--minutes", budget, *cards.of_robot(robot))
     settings = (f"--set={each}" for each in _unusual(state.get("configuration", {})))
-    return cards.command_line(*words, *_forced(reference), *settings)
+    return cards.command_line(*words, *_forced_of(reference), *settings)
 
 
-def _forced(reference: Path) -> tuple[str, ...]:
-    """Return the words without which the gate refuses a training of a motion."""
-    known = reference.is_file() and failures(ReferenceMotion.load(reference).scorecard)
-    return ("--force",) if known else ()
+def _command(reference: Path, *options: str) -> str:
+    return cards.command_line("train", reference, "-o", reference.parent / "training", *options)
+
+
+def _forced(card: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the words without which the gate refuses a training of a motion with a score card."""
+    return ("--force",) if failures(card) else ()
+
+
+def _forced_of(reference: Path) -> tuple[str, ...]:
+    return _forced(ReferenceMotion.load(reference).scorecard) if reference.is_file() else ()
 
 
 def _unusual(kept: Mapping[str, object]) -> list[str]:

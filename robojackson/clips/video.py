@@ -155,8 +155,9 @@ def probe(path: Path, limits: VideoLimits) -> VideoInfo:
     stamps = stamps[::step]
     fps = rate(stamps, fps / step)
     frames = len(stamps)
-    seconds = length_s(stamps, fps, path)
-    info = VideoInfo(path, *size, fps, frames, seconds, rotation, uneven(stamps, fps), step)
+    varies = uneven(stamps, fps)
+    seconds = length_s(stamps, fps, path) if varies else frames / fps
+    info = VideoInfo(path, *size, fps, frames, seconds, rotation, varies, step)
     require_within(info, limits)
     return info
 

@@ -19,7 +19,6 @@ from jaxtyping import Float
 
 from robojackson.errors import TruncatedVideo, UnreadableVideo
 from robojackson.files.file_kinds import TABLE, kind_of
-from robojackson.motion.landmark_track import uneven
 
 Packet: TypeAlias = "av.Packet[VideoStream]"
 
@@ -218,13 +217,11 @@ def rate(stamps: np.ndarray, stated: float) -> float:
 
 
 def length_s(stamps: np.ndarray, fps: float, path: Path) -> float:
-    """Return the seconds from the first frame to the end of the last.
+    """Return the seconds from the first frame to the end of the last, which are not evenly spaced.
 
     Raises:
         UnreadableVideo: it pauses for so long that its motion would have too many frames.
     """
-    if not uneven(stamps, fps):
-        return len(stamps) / fps
     seconds = float(stamps[-1]) + 1.0 / fps
     if seconds * fps > MOST_FRAMES:
         raise UnreadableVideo(

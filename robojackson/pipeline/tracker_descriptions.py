@@ -51,10 +51,7 @@ def require_for(tracker: TrackerDescription, robot: str) -> None:
     """
     if tracker.robot != robot:
         own = ", ".join(each.name for each in trackers_of(robot)) or "none"
-        raise BadPolicy(
-            f"tracker {tracker.name!r} drives robot {tracker.robot!r}, not {robot!r}; for {robot}: "
-            f"{own}"
-        )
+        raise BadPolicy(f"{tracker.why_not(robot)}; for {robot}: {own}")
 
 
 def default_trackers(robot: str) -> list[TrackerDescription]:

@@ -83,22 +83,23 @@ def advise(track: LandmarkTrack, begin_s: float = 0.0) -> tuple[Advice, ...]:
     Args:
         begin_s: Where the clip begins in the video that the user has, seconds.
     """
-    ranges = {"person_missing": visible_range(evenly(track))}
+    even = evenly(track)
+    ranges = {"person_missing": visible_range(even)}
     return tuple(
         Advice(kind, value, LIMITS[kind], ranges.get(kind)).later(begin_s)
-        for kind, value in _figures(track).items()
+        for kind, value in _figures(track, even.detected).items()
         if value is not None and (value > LIMITS[kind] if kind in AT_MOST else value < LIMITS[kind])
     )
 
 
-def _figures(track: LandmarkTrack) -> dict[Kind, float | None]:
+def _figures(track: LandmarkTrack, evenly_seen: np.ndarray) -> dict[Kind, float | None]:
     """Return every figure that advice is about; None where it was not measured."""
     seen = track.detected
     height = float(np.median(heights_px(track)[seen])) if seen.any() else None
     moved = None if track.to_first is None else stray_of(track.to_first, track.width, track.height)
     return {
         "head_down": _head_down(track) if seen.any() else None,
-        "person_missing": float(evenly(track).detected.mean()) if len(track) else None,
+        "person_missing": float(evenly_seen.mean()) if len(track) else None,
         "people": float(track.people),
         "body_outside": _outside(track) if seen.any() else None,
         "person_small": height,

@@ -87,7 +87,7 @@ def require_robot(robot: Robot, tracker: TrackerDescription) -> None:
     """
     name, dt = robot.description.name, robot.description.control_dt
     if name != tracker.robot:
-        raise BadPolicy(f"tracker {tracker.name!r} drives robot {tracker.robot!r}, not {name!r}")
+        raise BadPolicy(tracker.why_not(name))
     if abs(dt - tracker.control_dt) > CLOCK_S:
         raise BadPolicy(
             f"tracker {tracker.name!r} acts every {1e3 * tracker.control_dt:g} ms and robot "

@@ -96,3 +96,7 @@ class TrackerDescription:
         if self.network == "twist2" and not self.joints:
             raise ConflictingValues("network 'twist2' needs the joints", "network", "joints")
         return self
+
+    def why_not(self, robot: str) -> str:
+        """Return the words with which another robot than its own is refused."""
+        return f"tracker {self.name!r} drives robot {self.robot!r}, not {robot!r}"
