@@ -27,10 +27,10 @@ log = logging.getLogger(__name__)
 
 BESIDE = "beside_feedback"
 """Name, in a policy's file, of how well the two dance."""
-RESETS, SEED = 2, 20_261_127
+RESETS, SEED = 4, 20_261_127
 """Noisy starts a phase, and the seed of their noise, which no evaluation has by default."""
 MARGIN = 0.03
-"""Share of the starts, two of 49, by which one of the two must hold more to be taken for that.
+"""Share of the starts, three of 97, by which one of the two must hold more to be taken for that.
 Where neither does, the one of greater skill is taken."""
 
 
