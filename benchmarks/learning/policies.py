@@ -90,6 +90,12 @@ MOVES = {
         for take in ("05_02", "05_09", "05_18")
     },
     **{
+        f"g1_cmu_{take}_reimported": Move(
+            take, 25, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True
+        )
+        for take in ("05_09", "05_18")
+    },
+    **{
         f"g1_person_cam{camera}": Move(
             f"clips/person_cam{camera}.mp4", 15, 0, 0, 0, False, robot="g1", trained=False
         )
