@@ -91,7 +91,7 @@ MOVES = {
     },
     **{
         f"g1_cmu_{take}_reimported": Move(
-            take, 25, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True
+            take, 10, 0.93, 0.8, 0.6, False, robot="g1", mpjpe_mm=42, cmu=True
         )
         for take in ("05_09", "05_18")
     },
