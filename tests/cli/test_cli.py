@@ -302,7 +302,6 @@ def test_doctor_reports_what_is_installed_in_one_object() -> None:
     ) - {
         "python",
         "python_supported",
-        "ffmpeg",
         "javascript",
     }
     assert not result.loaded_prefect

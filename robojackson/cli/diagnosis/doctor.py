@@ -3,7 +3,6 @@ Imports no Prefect."""
 
 import ctypes
 import shlex
-import shutil
 import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, distributions, requires, version
@@ -80,7 +79,6 @@ def examine() -> dict[str, Any]:
         "libraries": libraries,
         "models": {size: not words for size, words in models.items()},
         "javascript": engine,
-        "ffmpeg": bool(shutil.which("ffmpeg")) or installed("imageio-ffmpeg") is not None,
         "missing": missing,
         "optional": optional,
     }

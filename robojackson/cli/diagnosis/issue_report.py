@@ -9,7 +9,6 @@ import json
 import os
 import platform
 import shutil
-import subprocess
 import sys
 import urllib.error
 import urllib.request
@@ -45,7 +44,6 @@ def issue_report(examined: Mapping[str, Any]) -> list[str]:
         "CPU": f"{cpu_model()}, {cores()} cores usable",
         "memory": _memory(),
         "OpenGL": renderer(),
-        "ffmpeg": ffmpeg_version(),
         "JavaScript engine": examined["javascript"] or "none",
         "pose models": ", ".join(size for size, there in examined["models"].items() if there),
         "Prefect server": server_state(os.environ),
@@ -79,21 +77,6 @@ def renderer() -> str:
     except Exception as cause:  # each backend has its own exceptions for a missing library
         return f"none: {type(cause).__name__}"
     return f"{backend}: {name.decode()}, OpenGL {api.decode()}"
-
-
-def ffmpeg_version() -> str:
-    """Return the version of ffmpeg on the path, else of the one in imageio-ffmpeg."""
-    program = shutil.which("ffmpeg")
-    try:
-        if program is None:
-            import imageio_ffmpeg
-
-            return f"{imageio_ffmpeg.get_ffmpeg_version()} (imageio-ffmpeg)"
-        command = [program, "-version"]
-        done = subprocess.run(command, capture_output=True, timeout=PATIENCE_S, check=True)
-    except (ImportError, OSError, RuntimeError, subprocess.SubprocessError) as cause:
-        return f"none: {type(cause).__name__}"
-    return " ".join(done.stdout.decode(errors="replace").split()[:3])
 
 
 def server_state(environment: Mapping[str, str]) -> str:

@@ -45,7 +45,7 @@ def test_the_report_is_a_table_in_markdown_with_what_an_issue_needs() -> None:
     rows = dict(line.strip("| ").split(" | ", 1) for line in table[2:])
     assert platform.python_version() in rows["Python"]
     assert "mujoco" in rows["packages"]
-    assert {"platform", "CPU", "OpenGL", "ffmpeg", "Prefect server", "store"} <= set(rows)
+    assert {"platform", "CPU", "OpenGL", "Prefect server", "store"} <= set(rows)
 
 
 def test_the_report_names_no_home_no_user_and_no_secret(
