@@ -93,8 +93,9 @@ def fixed_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
 
 
 def solid_geoms(model: mujoco.MjModel) -> Bool[np.ndarray, " G"]:
-    """Return whether each geom can touch another."""
+    """Return whether each geom can touch another, by its type and affinity or by a pair."""
     result: np.ndarray = (model.geom_contype | model.geom_conaffinity) != 0
+    result[model.pair_geom1] = result[model.pair_geom2] = True
     return result
 
 

@@ -154,9 +154,9 @@ def directions(robot: Robot) -> Float[np.ndarray, "C 3 E"]:
 
 @once_a_robot
 def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
-    """Return the sliding friction of each sole on the floor, as MuJoCo pairs geoms: the larger of
-    the two, or that of the one with the higher priority. Of a foot's geoms the most slippery
-    counts."""
+    """Return the sliding friction of each sole on the floor, as MuJoCo pairs geoms: that of their
+    pair, else the larger of the two, or that of the one with the higher priority. Of a foot's geoms
+    the most slippery counts."""
     model = robot.model
     touches = solid_geoms(model)
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
@@ -174,6 +174,10 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
 
 
 def _pair_friction(model: mujoco.MjModel, first: int, second: int) -> float:
+    both = np.sort([model.pair_geom1, model.pair_geom2], axis=0)
+    own = np.flatnonzero((sorted((first, second)) == both.T).all(1))
+    if len(own):
+        return float(model.pair_friction[own[0], 0])
     rank, slides = model.geom_priority, model.geom_friction[:, 0]
     if rank[first] != rank[second]:
         return float(slides[first if rank[first] > rank[second] else second])
