@@ -1,7 +1,7 @@
 """Requirements of a robot: a free root with limited hinges, mirrored sides, level soles at rest,
 lengths in metres and angles in radians, and a floor at z = 0."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 
 import mujoco
@@ -67,7 +67,9 @@ def unit_faults(model: mujoco.MjModel, description: RobotDescription) -> Iterato
     """Yield a line for each length that is larger than the robot, and for a tilt beyond half a
     turn: millimetres and degrees in place of metres and radians."""
     size = _size(model)
-    lengths = {f"sites.{key}": at for key, (_, at) in description.sites.items()}
+    lengths: dict[str, Sequence[float]] = {
+        f"sites.{key}": at for key, (_, at) in description.sites.items()
+    }
     for name, ball in description.contacts.items():
         lengths[f"contacts.{name}.offset"] = ball.offset
         lengths[f"contacts.{name}.radius"] = (ball.radius,)

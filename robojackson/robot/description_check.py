@@ -108,7 +108,7 @@ def _unknown_names(description: RobotDescription) -> Iterator[str]:
     bodies = tuple(model.body(index).name for index in range(1, model.nbody))
     joints = tuple(model.joint(index).name for index in range(1, model.njnt))
     sites = description.sites
-    wrong_joints = list(_lines(joint_faults, model, description))
+    wrong_joints = list(_joint_faults(model, description))
     yield from wrong_joints or unit_faults(model, description)
     yield from _error(check_floor, model, description)
     for key in KEYPOINTS + (TOES if set(TOES) & set(sites) else ()):
@@ -135,9 +135,9 @@ def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
         yield str(cause)
 
 
-def _lines(faults: Callable[..., Iterator[str]], *given: Any) -> Iterator[str]:
+def _joint_faults(model: mujoco.MjModel, description: RobotDescription) -> Iterator[str]:
     try:
-        yield from faults(*given)
+        yield from joint_faults(model, description)
     except RoboJacksonError as cause:
         yield str(cause)
 

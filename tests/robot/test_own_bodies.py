@@ -7,7 +7,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from robojackson.report.plots.robot_sheet import standing
+from robojackson.report.plots.robot_sheet import BESIDE, PIXELS, VIEWS, framing_of, standing
+from robojackson.report.video.panel_camera import view_of
 from robojackson.report.video.robot_scene import dressed
 from robojackson.retarget.feasibility.certification import certify
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
@@ -79,14 +80,14 @@ def test_what_is_fixed_to_the_world_is_floor(on_stage: Robot) -> None:
     assert not Detector(on_stage, 0.01, feet=False).touches(stand).floor.any()
 
 
-BESIDE = (
+PROPS = (
     '<body name="wall" pos="-3 0 1.5"><geom type="box" size=".1 4 1.5"/></body>'
     '<body name="ground"><geom type="plane" size="20 20 .1"/></body>'
 )
 
 
 def test_only_the_robot_is_drawn_and_measured(robot: Robot, tmp_path: Path) -> None:
-    crowded = load_robot(described_on(tmp_path, ("<worldbody>", f"<worldbody>{BESIDE}")))
+    crowded = load_robot(described_on(tmp_path, ("<worldbody>", f"<worldbody>{PROPS}")))
     bodies = [
         robot.model.body(body).name for body in robot.model.geom_bodyid[drawn_geoms(robot.model)]
     ]
@@ -132,3 +133,21 @@ def test_colours_are_those_of_mujocos_own_scene(tmp_path: Path) -> None:
         np.testing.assert_allclose(shown_rgba(model)[geom], drawn[geom])
     np.testing.assert_allclose(drawn[model.geom("butt").id], [1, 0, 0, 1])
     np.testing.assert_allclose(drawn[model.geom("head").id], [0.1, 0.2, 0.3, 1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 1.5, 4.0])
+def test_a_robot_of_any_height_fits_with_its_names_beside_it(scale: float, robot: Robot) -> None:
+    pose = standing(robot)
+    pose = replace(pose, low=scale * pose.low, high=scale * pose.high)
+    at, tall = (pose.low[:2] + pose.high[:2]) / 2, pose.high[2] - pose.low[2]
+    for _, azimuth in VIEWS:
+        camera = view_of(at, azimuth, PIXELS, PIXELS, framing_of(pose))
+        ends = np.array(np.meshgrid(*zip(pose.low, pose.high, strict=True))).reshape(3, -1).T
+        for aside in (-BESIDE, BESIDE):
+            pixels = camera.project(ends + aside * tall * camera.axes[0])
+            assert (pixels >= 0.0).all()
+            assert (pixels <= PIXELS).all()
+            if scale > 1.0:
+                assert np.ptp(pixels[:, 1]) > 0.7 * PIXELS, (
+                    "the robot is as large as the picture allows"
+                )

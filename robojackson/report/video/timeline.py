@@ -126,5 +126,6 @@ def person_points(sequence: SmplSequence, when: Timeline) -> Float[np.ndarray, "
         [np.interp(at, np.arange(len(path)), axis) for axis in path.T] for at in when.cycle_frames
     )
     travel = np.append(np.subtract(end, begin), 0.0)
-    result: np.ndarray = points[np.minimum(when.frame, len(points) - 1)]
-    return result + when.cycle[:, None, None] * travel
+    shown = points[np.minimum(when.frame, len(points) - 1)]
+    result: np.ndarray = shown + when.cycle[:, None, None] * travel
+    return result

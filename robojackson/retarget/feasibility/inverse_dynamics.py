@@ -174,8 +174,9 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
 
 
 def _pair_friction(model: mujoco.MjModel, first: int, second: int) -> float:
-    both = np.sort([model.pair_geom1, model.pair_geom2], axis=0)
-    own = np.flatnonzero((sorted((first, second)) == both.T).all(1))
+    one, other = model.pair_geom1, model.pair_geom2
+    is_own = ((one == first) & (other == second)) | ((one == second) & (other == first))
+    own = np.flatnonzero(is_own)
     if len(own):
         return float(model.pair_friction[own[0], 0])
     rank, slides = model.geom_priority, model.geom_friction[:, 0]
