@@ -21,6 +21,7 @@ from robojackson.robot.body_states import (
     drawn_geoms,
     names,
     require_same_joints,
+    shown_rgba,
 )
 from robojackson.robot.sampling import sampled
 
@@ -91,11 +92,13 @@ class _Frames:
 def body_parts(model: mujoco.MjModel) -> dict[int, list[tuple[Surface, Rgb]]]:
     """Return what is drawn of each body, in its own frame, with its colour (sRGB 0..1)."""
     parts: dict[int, list[tuple[Surface, Rgb]]] = {}
+    colours = np.clip(shown_rgba(model)[:, :3], 0.0, 1.0)
     for geom in map(int, drawn_geoms(model)):
         surface = _placed(model, geom)
         if len(surface.faces):
             body = int(model.geom_bodyid[geom])
-            parts.setdefault(body, []).append((surface, _colour(model, geom)))
+            red, green, blue = map(float, colours[geom])
+            parts.setdefault(body, []).append((surface, (red, green, blue)))
     return parts
 
 
@@ -111,13 +114,6 @@ def _meshes(
         dressed = [(surface, colours[tint or own]) for surface, own in parts]
         made[body] = {"mesh": scene.mesh(f"{name}{titles[body]}", dressed)}
     return made
-
-
-def _colour(model: mujoco.MjModel, geom: int) -> Rgb:
-    material = int(model.geom_matid[geom])
-    rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
-    red, green, blue = (float(value) for value in np.clip(rgba[:3], 0, 1))
-    return red, green, blue
 
 
 def _placed(model: mujoco.MjModel, geom: int) -> Surface:

@@ -14,6 +14,9 @@ from jaxtyping import Bool, Float, Int
 from robojackson.errors import UnknownName
 from robojackson.motion.reference_motion import ReferenceMotion
 
+UNDYED = np.array([0.5, 0.5, 0.5, 1.0])
+"""MuJoCo's default colour of a geom, RGBA."""
+
 
 @dataclass(frozen=True)
 class BodyStates:
@@ -69,9 +72,21 @@ def names(model: mujoco.MjModel, kind: str) -> list[str]:
 
 
 def drawn_geoms(model: mujoco.MjModel) -> Int[np.ndarray, " G"]:
-    """Return the numbers of a robot's geoms that are drawn."""
+    """Return the numbers of a robot's geoms that are drawn; a plane has no end, and is none."""
     shown = mujoco.MjvOption().geomgroup[model.geom_group] > 0
-    return np.flatnonzero((model.geom_bodyid > 0) & shown & (model.geom_rgba[:, 3] > 0))
+    plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
+    visible = shown_rgba(model)[:, 3] > 0
+    own = own_bodies(model)[model.geom_bodyid]
+    return np.flatnonzero(own & shown & visible & ~plane)
+
+
+def shown_rgba(model: mujoco.MjModel) -> Float[np.ndarray, "G 4"]:
+    """Return the colour in which MuJoCo draws each geom, 0..1: the geom's own, or that of its
+    material where it has no other than the default."""
+    rgba: np.ndarray = model.geom_rgba.copy()
+    dyed = (model.geom_matid >= 0) & (rgba == UNDYED).all(axis=1)
+    rgba[dyed] = model.mat_rgba[model.geom_matid[dyed]]
+    return rgba
 
 
 def own_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
@@ -93,8 +108,9 @@ def fixed_bodies(model: mujoco.MjModel) -> Bool[np.ndarray, " B"]:
 
 
 def solid_geoms(model: mujoco.MjModel) -> Bool[np.ndarray, " G"]:
-    """Return whether each geom can touch another."""
+    """Return whether each geom can touch another, by its type and affinity or by a pair."""
     result: np.ndarray = (model.geom_contype | model.geom_conaffinity) != 0
+    result[model.pair_geom1] = result[model.pair_geom2] = True
     return result
 
 

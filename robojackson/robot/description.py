@@ -106,7 +106,7 @@ class FallRule:
             does (the termination of BeyondMimic, 2025).
         height: Metres; when null, 0.7 or 0.55 of the height at which the root stands, whichever is
             less.
-        tilt: Radians.
+        tilt: Radians, at most pi.
     """
 
     frame: Literal["world", "reference"] = "world"

@@ -4,7 +4,8 @@
 be loaded with although it is hardly meant is reported, too.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
 import mujoco
@@ -12,11 +13,13 @@ import numpy as np
 from jaxtyping import Float
 
 from robojackson.errors import RoboJacksonError
-from robojackson.robot.checks import check_contact, check_floor, check_joints
+from robojackson.robot.actuation import per_hinge
+from robojackson.robot.checks import check_contact, check_floor, joint_faults, unit_faults
 from robojackson.robot.description import KEYPOINTS, TOES, RobotDescription
 from robojackson.robot.fixed_joints import fix_joints
 from robojackson.robot.mjcf import mjcf_path, read_spec
 from robojackson.robot.model import Robot, load_robot
+from robojackson.robot.model_files import FAULTS, first_line
 from robojackson.robot.names import known, matching, where
 
 SWAPPED_M = 0.01
@@ -26,6 +29,11 @@ UPRIGHT = 0.5
 """Least cosine of the angles of the root's x axis to forward and of its z axis to up."""
 MOST_DAMPING = 2.0
 """Largest stable damping of a hinge times the time step, in multiples of its inertia."""
+HINGE_KEYS = (
+    *("rest_pose", "stand_pose", "torque_limits", "speed_limits", "armature", "stiffness"),
+    *("damping", "natural_frequency", "damping_ratio", "action_scale"),
+)
+"""Keys of a description that name hinges of the compiled robot."""
 PAIRS = tuple(key.removeprefix("left_") for key in (*KEYPOINTS, *TOES) if key.startswith("left_"))
 
 
@@ -39,7 +47,8 @@ def problems(description: RobotDescription) -> list[str]:
         robot = load_robot(description)
     except RoboJacksonError as cause:
         return [str(cause)]
-    return [*_upright(robot), *_out_of_range(robot), *_sides(robot), *unstable_gains(robot)]
+    ranges = (*_out_of_range(robot), *_welded_out_of_range(description))
+    return [*_upright(robot), *ranges, *_sides(robot), *unstable_gains(robot)]
 
 
 def unstable_gains(
@@ -90,13 +99,17 @@ def _unknown_names(description: RobotDescription) -> Iterator[str]:
         spec = read_spec(mjcf_path(description), description)
         fix_joints(spec, description)
         model = spec.compile()
-    except (RoboJacksonError, ValueError) as cause:
+    except RoboJacksonError as cause:
         yield str(cause).splitlines()[0]
+        return
+    except FAULTS as cause:
+        yield f"{where(description, 'mjcf')}: {first_line(cause)}"
         return
     bodies = tuple(model.body(index).name for index in range(1, model.nbody))
     joints = tuple(model.joint(index).name for index in range(1, model.njnt))
     sites = description.sites
-    yield from _error(check_joints, model, description)
+    wrong_joints = list(_joint_faults(model, description))
+    yield from wrong_joints or unit_faults(model, description)
     yield from _error(check_floor, model, description)
     for key in KEYPOINTS + (TOES if set(TOES) & set(sites) else ()):
         if key not in sites:
@@ -110,7 +123,7 @@ def _unknown_names(description: RobotDescription) -> Iterator[str]:
         yield from _error(check_contact, description, name, bodies)
     for key in description.weights:
         yield from _error(known, "keypoint", key, sites, where(description, "weights"))
-    for section in ("rest_pose", "torque_limits"):
+    for section in HINGE_KEYS:
         for name in getattr(description, section):
             yield from _error(matching, "joint", name, joints, where(description, section))
 
@@ -118,6 +131,13 @@ def _unknown_names(description: RobotDescription) -> Iterator[str]:
 def _error(check: Callable[..., Any], *given: Any) -> Iterator[str]:
     try:
         check(*given)
+    except RoboJacksonError as cause:
+        yield str(cause)
+
+
+def _joint_faults(model: mujoco.MjModel, description: RobotDescription) -> Iterator[str]:
+    try:
+        yield from joint_faults(model, description)
     except RoboJacksonError as cause:
         yield str(cause)
 
@@ -136,13 +156,41 @@ def _upright(robot: Robot) -> Iterator[str]:
 
 
 def _out_of_range(robot: Robot) -> Iterator[str]:
-    """Yield the rest angles beyond a limit: the robot would not stand as its soles were checked."""
-    place = where(robot.description, "rest_pose")
-    for name, rest, low, high in zip(
-        robot.joint_names, robot.rest, robot.lower, robot.upper, strict=True
-    ):
-        if rest and not low <= rest <= high:  # zero where nothing is given
-            yield f"{place}.{name} is {rest:g}: beyond its range, {low:.3g} to {high:.3g} radians"
+    """Yield the angles of rest and stand beyond a limit: the robot would not stand as its soles
+    were checked."""
+    for key, pose in (("rest_pose", robot.rest), ("stand_pose", robot.stand)):
+        given = np.where(pose == 0.0, np.nan, pose)  # zero where nothing is given
+        place = where(robot.description, key)
+        yield from _beyond(place, robot.joint_names, given, robot.lower, robot.upper)
+
+
+def _welded_out_of_range(description: RobotDescription) -> Iterator[str]:
+    """Yield the angles beyond a limit at which hinges are welded."""
+    if not any(description.fixed_joints.values()):
+        return
+    model = read_spec(mjcf_path(description), description).compile()
+    hinges = np.flatnonzero(model.jnt_limited & (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
+    joints, place = tuple(model.joint(index).name for index in hinges), "fixed_joints"
+    limited = {
+        pattern: angle
+        for pattern, angle in description.fixed_joints.items()
+        if any(fnmatchcase(name, pattern) for name in joints)
+    }
+    angles = per_hinge(limited, joints, where(description, place))
+    yield from _beyond(where(description, place), joints, angles, *model.jnt_range[hinges].T)
+
+
+def _beyond(
+    place: str,
+    joints: Sequence[str],
+    angles: Float[np.ndarray, " J"],
+    lower: Float[np.ndarray, " J"],
+    upper: Float[np.ndarray, " J"],
+) -> Iterator[str]:
+    """Yield the angles, radians, beyond their ranges; NaN where none is given."""
+    for name, angle, low, high in zip(joints, angles, lower, upper, strict=True):
+        if angle < low or angle > high:
+            yield f"{place}.{name} is {angle:g}: beyond its range, {low:.3g} to {high:.3g} radians"
 
 
 def _sides(robot: Robot) -> Iterator[str]:

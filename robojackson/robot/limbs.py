@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 LEG_WORDS = {
     "hip": ("hip", "thigh", "femur", "upperleg"),
@@ -59,7 +59,13 @@ class Skeleton:
     def trunk(self) -> list[int]:
         """Bodies that are of no limb."""
         taken = {body for limb in self.limbs.values() for body in limb.bodies}
-        return [b for b in range(1, self.model.nbody) if not taken & set(path(self.model, b))]
+        return [b for b in self.bodies if not taken & set(path(self.model, b))]
+
+    @property
+    def bodies(self) -> list[int]:
+        """Bodies that the root carries, itself first; all where it has no free joint."""
+        roots, all_bodies = self.model.body_rootid, range(1, self.model.nbody)
+        return [b for b in all_bodies if not _free(self.model).size or roots[b] == self.root]
 
     def local(self, body: int, point: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
         """Return a point of the world in the frame of a body, to a tenth of a millimetre."""
@@ -72,10 +78,8 @@ def skeleton_of(model: mujoco.MjModel) -> Skeleton:
     """Find the root and the limbs of a model."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    free = np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
-    root = int(model.jnt_bodyid[free[0]]) if len(free) else 1
-    whole = Skeleton(model, data, root, {})
-    tips = [b for b in range(1, model.nbody) if b not in set(model.body_parentid[1:])]
+    whole = Skeleton(model, data, _root_of(model), {})
+    tips = [b for b in whole.bodies if b not in set(model.body_parentid[1:])]
     paths = {side: [path(model, t) for t in tips if side_of(whole, t) == side] for side in SIDES}
     legs = {side: _leg(whole, found) for side, found in paths.items()}
     taken = {body for leg in legs.values() for body in leg if side_of(whole, body)}
@@ -88,7 +92,19 @@ def skeleton_of(model: mujoco.MjModel) -> Skeleton:
             bodies = tuple(b for b in found[side] if b not in shared)
             if bodies and found["left"] and found["right"]:
                 limbs[f"{side}_{kind}"] = _limb(whole, bodies, words)
-    return Skeleton(model, data, root, limbs)
+    return Skeleton(model, data, whole.root, limbs)
+
+
+def _root_of(model: mujoco.MjModel) -> int:
+    """Return the body with the free joint that carries the most hinges; the first without any."""
+    turning = hinges_of(model, range(model.nbody))
+    carriers = model.body_rootid[model.jnt_bodyid[turning]]
+    free = [int(body) for body in model.jnt_bodyid[_free(model)]]
+    return max(free, key=lambda body: int((carriers == body).sum()), default=1)
+
+
+def _free(model: mujoco.MjModel) -> Int[np.ndarray, " F"]:
+    return np.flatnonzero(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
 
 
 def side_of(skeleton: Skeleton, body: int) -> str:

@@ -4,7 +4,7 @@ Metres, seconds, newton-metres. What the description does not name stays as the 
 description without these keys compiles to the stock model.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import mujoco
 import numpy as np
@@ -15,6 +15,7 @@ from robojackson.robot.fixed_joints import fix_joints, remove
 from robojackson.robot.model_files import free_name
 from robojackson.robot.names import known, where
 
+IsSolid = Callable[[mujoco.MjsGeom], bool]
 SAME_S = 1e-9
 MOST_SUBSTEPS = 1000
 """Largest number of physics steps in a control step."""
@@ -127,18 +128,38 @@ def _step_as(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     if stepping.ls_iterations is not None:
         spec.option.ls_iterations = stepping.ls_iterations
     if stepping.friction is not None:
-        soles = {point.body for point in description.contacts.values()}
-        floors = [geom for geom in spec.geoms if _is_floor(geom)]
-        # A body that the model has not is refused by name where contacts are bound.
-        bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
-        for geom in floors + [geom for body in bodies for geom in _foot_geoms(body)]:
-            geom.friction = [stepping.friction, *geom.friction[1:]]
+        _rub(spec, description, stepping.friction)
 
 
-def _foot_geoms(body: mujoco.MjsBody) -> list[mujoco.MjsGeom]:
+def _rub(spec: mujoco.MjSpec, description: RobotDescription, friction: float) -> None:
+    """Write the sliding friction of floor and feet, and of the pairs of both."""
+    soles, solid = {point.body for point in description.contacts.values()}, solid_in(spec)
+    floors = [geom for geom in spec.geoms if _is_floor(geom, solid)]
+    # A body that the model has not is refused by name where contacts are bound.
+    bodies = [body for name in sorted(soles) if (body := spec.body(name)) is not None]
+    rubbing = floors + [geom for body in bodies for geom in _foot_geoms(body, solid)]
+    for geom in rubbing:
+        geom.friction = [friction, *geom.friction[1:]]
+    named = {geom.name for geom in rubbing}
+    for pair in spec.pairs:
+        if {pair.geomname1, pair.geomname2} <= named:
+            pair.friction = [friction, friction, *pair.friction[2:]]
+
+
+def solid_in(spec: mujoco.MjSpec) -> IsSolid:
+    """Return the test of whether a geom of a spec can touch another: `body_states.solid_geoms`."""
+    paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+
+    def is_solid(geom: mujoco.MjsGeom) -> bool:
+        return bool(geom.contype or geom.conaffinity or geom.name in paired)
+
+    return is_solid
+
+
+def _foot_geoms(body: mujoco.MjsBody, solid: IsSolid) -> list[mujoco.MjsGeom]:
     """Return the geoms of the foot of a contact's body: `body_states.foot_bodies` of a spec."""
     geoms = list(_geoms_below(body))
-    while not (body.joints or any(geom.contype or geom.conaffinity for geom in geoms)):
+    while not (body.joints or any(map(solid, geoms))):
         if body.parent.name == "world":
             break
         body = body.parent
@@ -161,16 +182,17 @@ def integrator_of(name: str) -> mujoco.mjtIntegrator:
 
 def add_floor(spec: mujoco.MjSpec) -> None:
     """Add a floor at z = 0 to a spec that has none."""
-    if any(_is_floor(geom) for geom in spec.geoms):
+    solid = solid_in(spec)
+    if any(_is_floor(geom, solid) for geom in spec.geoms):
         return
     name = free_name("floor", [geom.name for geom in spec.geoms])
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     spec.worldbody.add_geom(name=name, type=plane, size=[40, 40, 1], rgba=[0.5] * 3 + [1])
 
 
-def _is_floor(geom: mujoco.MjsGeom) -> bool:
+def _is_floor(geom: mujoco.MjsGeom, solid: IsSolid) -> bool:
     """Return whether a geom of a spec is a plane that is not there for its looks alone."""
-    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE and (geom.contype or geom.conaffinity))
+    return bool(geom.type == mujoco.mjtGeom.mjGEOM_PLANE and solid(geom))
 
 
 def substeps_of(control_dt: float, timestep: float) -> int | None:

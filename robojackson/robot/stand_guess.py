@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robojackson.robot.body_states import solid_geoms
 from robojackson.robot.description import ContactPoint
 from robojackson.robot.keypoint_guess import Guess, foot_body, geoms_of
 from robojackson.robot.limbs import SIDES, Limb, Skeleton
@@ -144,7 +145,7 @@ def _standing(skeleton: Skeleton, leg: Limb) -> list[_Ball]:
         if model.body_parentid[child] in bodies and not model.body_jntnum[child]:
             bodies.append(child)
     geoms = [geom for each in bodies for geom in geoms_of(model, each)]
-    solid = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    solid = [geom for geom in geoms if solid_geoms(model)[geom]]
     balls = [ball for geom in solid or geoms for ball in _balls(skeleton, geom)]
     floor = min((ball.lowest for ball in balls), default=0.0)
     return [ball for ball in balls if ball.lowest < floor + LEVEL_M]

@@ -1,6 +1,7 @@
 """The page: complete, escaped, offline; and what it says is what was measured."""
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +16,7 @@ from robojackson.clips.video import VideoInfo
 from robojackson.files.json_types import to_json
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import SmplSequence
-from robojackson.report.pages.evaluation_text import beat_rows, next_step
+from robojackson.report.pages.evaluation_text import beat_rows, headline, next_step
 from robojackson.report.pages.page_content import (
     TO_COME,
     Results,
@@ -117,6 +118,26 @@ def test_beats_are_a_table_and_a_tile_beside_chance() -> None:
 def test_headline_names_the_best_baseline() -> None:
     html = render(PageContent(title="x", evaluation=SUMMARY))
     assert "finished 62% of 73 rollouts without a fall; the best baseline (statue) 3%." in html
+
+
+@pytest.mark.parametrize("nothing", [None, math.nan])
+def test_a_baseline_without_a_figure_is_left_out(nothing: float | None) -> None:
+    baselines = {"statue": {"success": nothing}, "random": {"success": 0.25}, "mean_pose": {}}
+    evaluation = {"success": 0.5, "rollouts": 73.0, "baselines": baselines}
+    assert headline(evaluation).endswith("without a fall; the best baseline (random) 25%.")
+    alone = {**evaluation, "baselines": {"statue": {"success": nothing}}}
+    assert headline(alone).endswith("of 73 rollouts without a fall.")
+
+
+@pytest.mark.parametrize("nothing", [None, math.nan])
+def test_a_robot_without_a_figure_is_neither_better_nor_worse(nothing: float | None) -> None:
+    evaluation = {
+        "success": nothing,
+        "rollouts": 0.0,
+        "verdict": {"sentence": "Too short."},
+        "baselines": {"statue": {"success": 0.5}},
+    }
+    assert headline(evaluation) == "Too short."
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,8 @@ def test_point_behind_the_camera_is_not_drawn() -> None:
 
 
 def test_skeleton_shows_both_sides_in_their_colours(sequence: SmplSequence) -> None:
-    panel = skeleton_panel(sequence, 0, FRONT, 320, 480).reshape(-1, 3)
+    panel = skeleton_panel(sequence.keypoints_w[0], sequence.contact[0], FRONT, 320, 480)
+    panel = panel.reshape(-1, 3)
     for colour in (canvas.LEFT, canvas.RIGHT, canvas.MIDDLE):
         assert (np.abs(panel.astype(int) - colour).max(1) < 8).any()
 

@@ -29,6 +29,20 @@ def test_a_robot_that_drifts_over_the_floor_does_not_leave_the_dance(
         assert (max(error.max() for error in shown.error_m.values()) > 0.1) == is_off
 
 
+def test_person_and_camera_do_not_jump_back_with_a_cycle(
+    track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion
+) -> None:
+    walked = np.array(sequence.keypoints_w, float)
+    walked[:, :, 0] += 0.05 * np.arange(len(walked))[:, None]
+    motion = replace(reference, certificate=None)
+    rollout = np.tile(motion.qpos, (4, 1))
+    person = replace(sequence, keypoints_w=walked)
+    shown = player(track, person, motion, rollout, stock(), 30.0, 5.0)
+    steps = np.diff(shown.points["person"][:, 0, 0])
+    assert len(steps) > 40
+    assert ((steps >= 0.0) & (steps < 0.11)).all()
+
+
 def test_a_cut_dance_is_noted_on_its_page(
     track: LandmarkTrack, sequence: SmplSequence, reference: ReferenceMotion
 ) -> None:

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from robojackson.clips.video import VideoLimits
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
 from robojackson.report.video.film import VideoConfig
-from robojackson.report.video.timeline import cut_note, reference_qpos, timeline
+from robojackson.report.video.timeline import cut_note, person_points, reference_qpos, timeline
 
 
 def test_cyclic_reference_starts_again_after_a_cycle(reference: ReferenceMotion) -> None:
@@ -50,6 +52,32 @@ def test_reference_moves_on_by_a_cycle(reference: ReferenceMotion) -> None:
     when = timeline(reference, 30.0, 12, 2 * len(reference), 1 / reference.dt, 99.0)
     qpos = reference_qpos(reference, when)
     np.testing.assert_allclose(qpos[27, :3] - qpos[0, :3], reference.cycle_offset)
+
+
+def test_a_person_who_walks_goes_on_after_a_cycle(
+    reference: ReferenceMotion, sequence: SmplSequence
+) -> None:
+    """The expected path is a straight line: 1.5 m/s to the left, and a bouncing pelvis."""
+    walked = np.array(sequence.keypoints_w, float)
+    walked[:, :, 1] += 1.5 * np.arange(12)[:, None] / 30.0
+    walking = replace(
+        sequence, keypoints_w=walked + [0.0, 0.0, 0.1] * (np.arange(12) % 2)[:, None, None]
+    )
+    cycle = replace(reference, dt=0.4 / len(reference), source_time_s=np.arange(27) * 0.4 / 27)
+    when = timeline(cycle, 30.0, 12, 3 * len(cycle), 30.0, 99.0)
+    moved = person_points(walking, when)
+    np.testing.assert_allclose(moved[:, 0, 1], moved[0, 0, 1] + 1.5 * when.time_s, atol=1e-9)
+    assert np.ptp(moved[:, 0, 2]) == pytest.approx(0.1)
+
+
+def test_a_person_of_a_motion_that_ends_stays_where_the_clip_has_it(
+    reference: ReferenceMotion, sequence: SmplSequence
+) -> None:
+    for motion in (replace(reference, cyclic=False), reference):
+        when = timeline(motion, 30.0, 12, 0, 30.0, 99.0)
+        np.testing.assert_array_equal(
+            person_points(sequence, when), sequence.keypoints_w[when.frame]
+        )
 
 
 def test_a_dance_that_is_cut_says_what_is_shown_of_what(reference: ReferenceMotion) -> None:

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from robojackson.errors import BadConfiguration
-from robojackson.robot.description import ContactPoint, RobotDescription
+from robojackson.robot.description import ContactPoint, FallRule, RobotDescription
 from robojackson.robot.description_check import problems
 from robojackson.robot.mjcf import mjcf_path
 from robojackson.robot.model import load_robot
+from robojackson.robot.names import where
+from tests.fixtures.own_robot import described_on
 from tests.fixtures.robots import description
 
 
@@ -156,3 +158,79 @@ def test_a_keypoint_off_its_mirror_image_is_reported(humanoid: RobotDescription)
 def test_a_rest_angle_beyond_its_range_is_reported(humanoid: RobotDescription) -> None:
     (found,) = problems(replace(humanoid, rest_pose={**humanoid.rest_pose, "abdomen_z": 1.0}))
     assert "rest_pose.abdomen_z is 1: beyond its range" in found
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("stand_pose", {"left_knee": -20.0}, "stand_pose.left_knee is -20: beyond its range"),
+        ("fall", FallRule(tilt=45.0), "fall.tilt is 45: at most 3.14 radians"),
+        ("imu", (0.0, 0.0, 100.0), "imu: 100 m is more than the whole robot"),
+        (
+            "fixed_joints",
+            {"abdomen_z": -30.0},
+            "fixed_joints.abdomen_z is -30",
+        ),
+    ],
+)
+def test_degrees_and_millimetres_are_reported(
+    key: str, value: object, words: str, humanoid: RobotDescription
+) -> None:
+    found = problems(replace(humanoid, **{key: value}))
+    assert words in found[0]
+
+
+def test_lengths_beyond_the_robot_are_refused_all_at_once(humanoid: RobotDescription) -> None:
+    sites = {**humanoid.sites, "pelvis": ("pelvis", (0.0, 0.0, -40.0))}
+    contacts = {
+        **humanoid.contacts,
+        "left_foot": replace(humanoid.contacts["left_foot"], radius=75.0, offset=(0.0, 9.0, 0.0)),
+    }
+    wrong = replace(humanoid, sites=sites, contacts=contacts)
+    places = ["sites.pelvis: 40 m", "contacts.left_foot.offset: 9 m", "left_foot.radius: 75 m"]
+    found = problems(wrong)
+    assert [place in line for place, line in zip(places, found, strict=True)] == [True] * 3
+    with pytest.raises(BadConfiguration, match=r"sites.pelvis: 40 m .* lengths are in metres"):
+        load_robot(wrong)
+
+
+def test_a_wrong_pattern_of_every_key_is_reported(humanoid: RobotDescription) -> None:
+    keys = ("stand_pose", "speed_limits", "armature", "stiffness", "damping",
+            "natural_frequency", "damping_ratio", "action_scale")  # fmt: skip
+    result = problems(replace(humanoid, **{key: {"*_kne": 1.0} for key in keys}))
+    assert [next(key for key in keys if f": {key})" in line) for line in result] == list(keys)
+
+
+def test_what_mujoco_cannot_compile_names_the_key(
+    humanoid: RobotDescription, tmp_path: Path
+) -> None:
+    described = described_on(tmp_path, ('joint="right_knee"', 'joint="right_hip_y"'))
+    (found,) = problems(described)
+    assert found.startswith(f"{where(described, 'mjcf')}: Error: ")
+    assert "repeated" in found
+
+
+BALL = '<body name="ball" pos="2 0 .2"><freejoint/><geom size=".1" mass=".4"/></body>'
+SLIDE = 'range="-45 45" stiffness="20" type="slide"'
+TURN = (
+    '<joint armature="0" damping="0" limited="false" name="root" pos="0 0 0" stiffness="0" type="'
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("<worldbody>", f"<worldbody>{BALL}", "'ball' has the free joint: only 'torso' may move"),
+        ("</worldbody>", f"{BALL}</worldbody>", "'ball' has the free joint: only 'torso' may move"),
+        (SLIDE.replace("slide", "hinge"), SLIDE, "the slide joint 'abdomen_z': a robot has hinges"),
+        (f'{TURN}free"/>', "", "root_body: 'torso' has no free joint; give it one"),
+    ],
+)
+def test_a_joint_that_no_robot_has_is_named_with_a_remedy(
+    old: str, new: str, words: str, tmp_path: Path
+) -> None:
+    described = described_on(tmp_path, (old, new))
+    (found,) = problems(described)
+    assert words in found
+    with pytest.raises(BadConfiguration, match="joint"):
+        load_robot(described)

@@ -208,3 +208,17 @@ def test_a_name_of_a_file_is_one_that_a_description_may_have(tmp_path: Path) -> 
     out = tmp_path / f"my robot ({'x' * 80}).yaml"
     new_robot(model, out, force=False)
     assert read_description(out).name == f"my_robot_{'x' * 55}"
+
+
+@pytest.mark.parametrize("beside", ["<worldbody>{}", "{}</worldbody>"])
+def test_a_free_object_is_not_the_robot(beside: str, tmp_path: Path) -> None:
+    ball = (
+        '<body name="ball" pos="2 0 9"><freejoint/><geom name="puck" size=".1" mass=".4"/></body>'
+    )
+    text = gymnasium_model().read_text()
+    alone, _ = drafted(model_file(tmp_path, text), tmp_path)
+    crowded = text.replace(beside.format(""), beside.format(ball))
+    found, described = drafted(model_file(tmp_path, crowded), tmp_path)
+    assert found.text == alone.text
+    (problem,) = problems(described)
+    assert "'ball' has the free joint: only 'torso' may move freely" in problem

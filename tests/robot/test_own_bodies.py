@@ -7,15 +7,19 @@ import mujoco
 import numpy as np
 import pytest
 
+from robojackson.report.plots.robot_sheet import BESIDE, PIXELS, VIEWS, framing_of, standing
+from robojackson.report.video.panel_camera import view_of
+from robojackson.report.video.robot_scene import dressed
 from robojackson.retarget.feasibility.certification import certify
 from robojackson.retarget.feasibility.contact_wrench import Tolerance
 from robojackson.retarget.feasibility.inverse_dynamics import body_weight
 from robojackson.retarget.solver.collision import Detector
 from robojackson.rl.modes.reset_states import default_standing_pose
 from robojackson.rl.sim.robot_batch import centre_of_mass as simulated_centre
+from robojackson.robot.body_states import drawn_geoms, shown_rgba
 from robojackson.robot.model import Robot, load_robot
 from robojackson.robot.tree_kinematics import centre_of_mass, point_jacobian, pose, tree
-from tests.fixtures.own_robot import gymnasium_model
+from tests.fixtures.own_robot import UNTOUCHED, described_on, gymnasium_model
 from tests.fixtures.robots import description
 
 STAGE = (
@@ -74,3 +78,76 @@ def test_what_is_fixed_to_the_world_is_floor(on_stage: Robot) -> None:
     assert len(touches.floor) >= 4, "each foot touches the plane and the slab"
     assert touches.floor.all()
     assert not Detector(on_stage, 0.01, feet=False).touches(stand).floor.any()
+
+
+PROPS = (
+    '<body name="wall" pos="-3 0 1.5"><geom type="box" size=".1 4 1.5"/></body>'
+    '<body name="ground"><geom type="plane" size="20 20 .1"/></body>'
+)
+
+
+def test_only_the_robot_is_drawn_and_measured(robot: Robot, tmp_path: Path) -> None:
+    crowded = load_robot(described_on(tmp_path, ("<worldbody>", f"<worldbody>{PROPS}")))
+    bodies = [
+        robot.model.body(body).name for body in robot.model.geom_bodyid[drawn_geoms(robot.model)]
+    ]
+    found = [
+        crowded.model.body(b).name for b in crowded.model.geom_bodyid[drawn_geoms(crowded.model)]
+    ]
+    assert found == bodies
+    assert {"wall", "ground", "world"}.isdisjoint(found)
+    alone, beside = standing(robot), standing(crowded)
+    np.testing.assert_allclose([beside.low, beside.high], [alone.low, alone.high])
+
+
+def test_what_a_material_hides_is_not_drawn(robot: Robot, tmp_path: Path) -> None:
+    bubble = f'<geom name="bubble" size=".6" material="ghost" mass="0" {UNTOUCHED}/>'
+    changes = ("<asset>", '<asset><material name="ghost" rgba="1 0 0 0"/>')
+    for colour, is_drawn in ((' rgba=".5 .5 .5 1"', False), (' rgba=".5 .5 .4 1"', True)):
+        own = bubble.replace("/>", f"{colour}/>")
+        hidden = load_robot(
+            described_on(tmp_path, changes, ('<geom name="head"', f'{own}<geom name="head"'))
+        )
+        assert (hidden.model.geom("bubble").id in drawn_geoms(hidden.model)) == is_drawn
+        assert (standing(hidden).high[2] > standing(robot).high[2] + 0.3) == is_drawn
+        painted = dressed(hidden.model, 64, 64, (1.0, 0.0, 0.0))
+        assert painted.geom_rgba[hidden.model.geom("bubble").id, 3] == is_drawn
+
+
+def test_colours_are_those_of_mujocos_own_scene(tmp_path: Path) -> None:
+    """A geom's own colour goes before its material's, but for MuJoCo's default grey."""
+    changes = [
+        ("<asset>", '<asset><material name="red" rgba="1 0 0 1"/>'),
+        ('<geom name="head"', '<geom name="head" material="red" rgba=".1 .2 .3 1"'),
+        ('name="butt"', 'name="butt" material="red" rgba=".5 .5 .5 1"'),
+    ]
+    model = load_robot(described_on(tmp_path, *changes)).model
+    data, scene = mujoco.MjData(model), mujoco.MjvScene(model, 1000)
+    mujoco.mj_forward(model, data)
+    everything = mujoco.mjtCatBit.mjCAT_ALL.value
+    camera, option = mujoco.MjvCamera(), mujoco.MjvOption()
+    mujoco.mjv_updateScene(model, data, option, None, camera, everything, scene)
+    kind = int(mujoco.mjtObj.mjOBJ_GEOM)
+    drawn = {g.objid: g.rgba.copy() for g in scene.geoms[: scene.ngeom] if g.objtype == kind}
+    for geom in drawn_geoms(model):
+        np.testing.assert_allclose(shown_rgba(model)[geom], drawn[geom])
+    np.testing.assert_allclose(drawn[model.geom("butt").id], [1, 0, 0, 1])
+    np.testing.assert_allclose(drawn[model.geom("head").id], [0.1, 0.2, 0.3, 1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 1.5, 4.0])
+def test_a_robot_of_any_height_fits_with_its_names_beside_it(scale: float, robot: Robot) -> None:
+    pose = standing(robot)
+    pose = replace(pose, low=scale * pose.low, high=scale * pose.high)
+    at, tall = (pose.low[:2] + pose.high[:2]) / 2, pose.high[2] - pose.low[2]
+    for _, azimuth in VIEWS:
+        camera = view_of(at, azimuth, PIXELS, PIXELS, framing_of(pose))
+        ends = np.array(np.meshgrid(*zip(pose.low, pose.high, strict=True))).reshape(3, -1).T
+        for aside in (-BESIDE, BESIDE):
+            pixels = camera.project(ends + aside * tall * camera.axes[0])
+            assert (pixels >= 0.0).all()
+            assert (pixels <= PIXELS).all()
+            if scale > 1.0:
+                assert np.ptp(pixels[:, 1]) > 0.7 * PIXELS, (
+                    "the robot is as large as the picture allows"
+                )

@@ -151,7 +151,7 @@ const Dance = (() => {
       this.sites = dance.sites.map((name) => mujoco.mj_name2id(this.model, mujoco.mjtObj.mjOBJ_SITE.value, name));
       const rk4 = (this.model.opt.integrator.value ?? this.model.opt.integrator) === RK4;
       this.substep = rk4 ? (model, data) => stepOfRungeKutta(mujoco, model, data) : mujoco.mj_step;
-      this.friction = Float64Array.from(this.model.geom_friction);
+      this.friction = ['geom_friction', 'pair_friction'].map((name) => [name, Float64Array.from(this.model[name])]);
       this.gravity = this.model.opt.gravity[2];
       this.last = new Float64Array(nu); this.targets = new Float64Array(nu);
       this.start(0);
@@ -308,7 +308,7 @@ const Dance = (() => {
     }
 
     push(x, y) { this.data.qvel[0] += x; this.data.qvel[1] += y; }
-    setFriction(factor) { this.model.geom_friction.set(this.friction.map((value) => value * factor)); }
+    setFriction(factor) { for (const [name, values] of this.friction) this.model[name].set(values.map((value) => value * factor)); }
     setGravity(factor) { this.model.opt.gravity[2] = this.gravity * factor; }
 
     /* Rows of x y z qw qx qy qz a body. */

@@ -1,5 +1,6 @@
 """Texts of an evaluation: one sentence, tiles and rows of tables."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -48,28 +49,35 @@ def dancer_title(evaluation: Evaluation) -> str:
 
 
 def headline(evaluation: Evaluation) -> str:
-    """Return one sentence about the result, beside the best of the baselines."""
+    """Return one sentence about the result, beside the best of the baselines that have a figure."""
     if not evaluation:
         return ""
     text = str(evaluation.get("verdict", {}).get("sentence", ""))
-    if evaluation.get("success") is None:
+    ours = _share(evaluation)
+    if ours is None:
         return text
     text += " " if text else ""
     text += (
-        f"The {dancer_of(evaluation)} finished {format_value('success', evaluation['success'])} of "
+        f"The {dancer_of(evaluation)} finished {format_value('success', ours)} of "
         f"{format_value('rollouts', evaluation['rollouts'])} rollouts without a fall"
     )
-    baselines = evaluation.get("baselines", {})
-    if not baselines:
+    found = {name: _share(one) for name, one in evaluation.get("baselines", {}).items()}
+    shares = {name: share for name, share in found.items() if share is not None}
+    if not shares:
         return f"{text}."
-    name = max(baselines, key=lambda key: baselines[key]["success"])
-    best = POLICY_TITLES.get(name, (name, ""))[0]
-    theirs, ours = baselines[name]["success"], evaluation["success"]
+    name = max(shares, key=lambda key: shares[key])
+    best, theirs = POLICY_TITLES.get(name, (name, ""))[0], shares[name]
     if theirs < ours:
         return f"{text}; the best baseline ({best}) {format_value('success', theirs)}."
     how = "as well" if theirs == ours else "better"
     figure = format_value("success", theirs)
     return f"{text}; a baseline that learnt nothing ({best}) does {how}: {figure}."
+
+
+def _share(figures: Evaluation) -> float | None:
+    """Return the share of the rollouts without a fall; None where there is no figure."""
+    share = figures.get("success")
+    return None if share is None or not math.isfinite(share) else float(share)
 
 
 def next_step(evaluation: Evaluation, longer: str) -> tuple[str, str]:

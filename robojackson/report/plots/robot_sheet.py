@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 
 from robojackson.report.plots.run_plots import ACCENT, INK, SECOND
 from robojackson.report.video.canvas import Picture, side_colour
-from robojackson.report.video.panel_camera import view_of
+from robojackson.report.video.panel_camera import Framing, Subject, View, fit, view_of
 from robojackson.report.video.robot_extent import corners
 from robojackson.report.video.robot_panel import REFERENCE_TINT, RobotView
+from robojackson.robot.body_states import drawn_geoms
 from robojackson.robot.model import Robot
 
 PIXELS = 1800
@@ -39,7 +40,7 @@ class Standing:
     Attributes:
         qpos: Pose of the robot.
         keypoints, balls: Positions, world, metres.
-        low, high: Corners of the box around it, world, metres.
+        low, high: Corners of the box around what is drawn of it, world, metres.
     """
 
     qpos: Float[np.ndarray, " nq"]
@@ -58,9 +59,8 @@ def standing(robot: Robot) -> Standing:
     soles = _balls(robot, data)[:, 2] - robot.contact_radii
     data.qpos[2] -= soles.min()
     mujoco.mj_kinematics(model, data)
-    on_robot = np.flatnonzero(model.geom_bodyid > 0)
     points = data.site_xpos[robot.keypoint_sites].copy()
-    box = np.concatenate([corners(model, data, on_robot).reshape(-1, 3), points])
+    box = np.concatenate([corners(model, data, drawn_geoms(model)).reshape(-1, 3), points])
     return Standing(
         data.qpos.copy(),
         dict(zip(robot.keypoint_names, points, strict=True)),
@@ -81,21 +81,35 @@ def robot_sheet(robot: Robot) -> Figure:
     figure = Figure(figsize=(15.0, height), layout="constrained", facecolor="white")
     grid = figure.subplots(1, 3, width_ratios=(1.0, 0.9, 0.8))
     with RobotView(robot.model, PIXELS, PIXELS, REFERENCE_TINT) as view:
+        at, framing = (pose.low[:2] + pose.high[:2]) / 2, framing_of(pose)
         for axes, (title, azimuth) in zip(grid, VIEWS, strict=False):
-            at = (pose.low[:2] + pose.high[:2]) / 2
-            _panel(axes, robot, pose, view.picture(pose.qpos, at, azimuth), at, azimuth)
+            camera = view_of(at, azimuth, PIXELS, PIXELS, framing)
+            _panel(axes, robot, pose, view.picture(pose.qpos, at, azimuth, framing), camera)
             axes.set_title(f"{robot.description.name}, {title}", fontsize=10)
     _ranges(grid[2], robot)
     return figure
 
 
-def _panel(
-    axes: Axes, robot: Robot, pose: Standing, picture: Picture, at: np.ndarray, azimuth: float
-) -> None:
+def framing_of(pose: Standing) -> Framing:
+    """Return the camera that holds the robot, with room for the names beside it, in all views."""
+    tall = float(np.ptp([pose.low[2], pose.high[2]]))
+    middle = np.append((pose.low[:2] + pose.high[:2]) / 2, 0.0)
+    subjects = []
+    for _, azimuth in VIEWS:
+        aside = BESIDE * tall * np.abs([np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))])
+        room = np.append(aside, MARGIN * tall)
+        subjects.append(Subject(_ends(pose.low - room, pose.high + room) - middle, azimuth))
+    return fit(subjects, PIXELS, PIXELS)
+
+
+def _ends(low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> Float[np.ndarray, "8 3"]:
+    """Return the corners of a box."""
+    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+
+
+def _panel(axes: Axes, robot: Robot, pose: Standing, picture: Picture, camera: View) -> None:
     """Draw a view, cropped around the robot, with names in two columns beside it."""
-    camera = view_of(at, azimuth, PIXELS, PIXELS)
-    ends = np.array(np.meshgrid(*zip(pose.low, pose.high, strict=True))).reshape(3, -1).T
-    box = camera.project(ends)
+    box = camera.project(_ends(pose.low, pose.high))
     low, high = box.min(0), box.max(0)
     pad = MARGIN * (high[1] - low[1])
     beside = BESIDE * (high[1] - low[1])

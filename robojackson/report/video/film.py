@@ -28,7 +28,7 @@ from robojackson.report.video.robot_scene import Tint
 from robojackson.report.video.skeleton_panel import skeleton_panel
 from robojackson.report.video.source_panel import SourceClip
 from robojackson.report.video.threaded_view import BeginPicture, threaded_view
-from robojackson.report.video.timeline import Timeline
+from robojackson.report.video.timeline import Timeline, person_points
 
 Drawn = Callable[[], canvas.Picture]
 Begin = Callable[[int, Framing], Drawn]
@@ -123,7 +123,7 @@ class Film:
     ) -> None:
         """Add the recovered skeleton, from the front or rotated by `turn_deg` to its left."""
         frames = np.minimum(self._when.frame, len(sequence) - 1)
-        points = np.asarray(sequence.keypoints_w[frames], float)
+        points = person_points(sequence, self._when)
         target, azimuth = self._followed(points[:, 0]), self._config.azimuth_deg + turn_deg
         around = points - np.pad(target, ((0, 0), (0, 1)))[:, None]
         room = np.concatenate([around, around * FLOOR]).reshape(-1, 3)
@@ -131,7 +131,8 @@ class Film:
 
         def draw(index: int, framing: Framing) -> canvas.Picture:
             view = view_of(target[index], azimuth, *self._size, framing)
-            panel = skeleton_panel(sequence, int(frames[index]), view, *self._size)
+            contact = sequence.contact[frames[index]]
+            panel = skeleton_panel(points[index], contact, view, *self._size)
             canvas.label(panel, title, "" if sequence.valid[frames[index]] else "(filled in)")
             return panel
 

@@ -1,7 +1,7 @@
 """The scene in which a robot is drawn: the same floor, light and background for every robot.
 
-Floors, lights and skies of the robots' own models differ (mjlab's G1 is in the dark), so none of
-them is drawn. Metres; RGB 0..1.
+Floors, lights and skies of the robots' own models differ (mjlab's G1 is in the dark), and a stage
+or a wall may hide the robot, so none of them is drawn. Metres; RGB 0..1.
 """
 
 import copy
@@ -15,7 +15,7 @@ from jaxtyping import Float
 from robojackson.report.video.canvas import BACKDROP, Picture
 from robojackson.report.video.mesh_detail import simplify
 from robojackson.report.video.panel_camera import FOCAL
-from robojackson.robot.body_states import drawn_geoms
+from robojackson.robot.body_states import drawn_geoms, shown_rgba
 
 Tint = tuple[float, float, float]
 SHADOW_ALPHA, SHADOW_HEIGHT = 0.28, 0.004
@@ -35,18 +35,17 @@ FAR = 1.0
 
 
 def dressed(model: mujoco.MjModel, width: int, height: int, tint: Tint) -> mujoco.MjModel:
-    """Return a copy of the model with our lens, the robot in one colour, and no floor."""
+    """Return a copy of the model with our lens, the robot in one colour, and nothing else."""
     dressed = copy.copy(model)
     simplify(dressed, DETAIL_M)
     dressed.vis.quality.offsamples = 0
     dressed.vis.global_.offwidth, dressed.vis.global_.offheight = width, height
     dressed.vis.global_.fovy = float(np.degrees(2.0 * np.arctan(0.5 / FOCAL)))
-    floors = dressed.geom_type == mujoco.mjtGeom.mjGEOM_PLANE.value
-    dressed.geom_matid[floors] = -1
-    dressed.geom_rgba[floors] = 0.0
-    on_robot = dressed.geom_bodyid > 0
-    dressed.geom_matid[on_robot] = -1
-    dressed.geom_rgba[on_robot, :3] = tint
+    drawn = drawn_geoms(dressed)
+    opacity = shown_rgba(dressed)[drawn, 3]
+    dressed.geom_matid[:] = -1
+    dressed.geom_rgba[:] = 0.0
+    dressed.geom_rgba[drawn, :3], dressed.geom_rgba[drawn, 3] = tint, opacity
     return dressed
 
 

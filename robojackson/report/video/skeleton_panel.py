@@ -4,10 +4,10 @@ World: x forward, y left, z up; metres.
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robojackson.body.skeleton import KEYPOINT_NAMES, PARENTS
-from robojackson.motion.smpl_sequence import PLANTED, SmplSequence
+from robojackson.motion.smpl_sequence import PLANTED
 from robojackson.report.video import canvas
 from robojackson.report.video.panel_camera import View
 
@@ -18,15 +18,24 @@ FEET = (("left_ankle", "left_foot"), ("right_ankle", "right_foot"))
 
 
 def skeleton_panel(
-    sequence: SmplSequence, frame: int, view: View, width: int, height: int
+    points: Float[np.ndarray, "29 3"],
+    contact: Int[np.ndarray, "4"],
+    view: View,
+    width: int,
+    height: int,
 ) -> canvas.Picture:
-    """Return one frame: grid, shadow and bones, the far ones first."""
+    """Return one frame: grid, shadow and bones, the far ones first.
+
+    Args:
+        points: Keypoints, world, metres.
+        contact: State of heel and toe, left and right: 0 air, 1 planted, 2 sliding.
+        width, height: Size of the panel, pixels.
+    """
     panel = np.full((height, width, 3), canvas.BACKDROP, np.uint8)
     _draw_grid(panel, view)
-    points = sequence.keypoints_w[frame]
     _draw_bones(panel, points * [1.0, 1.0, 0.0], view, shadow=True)
     _draw_bones(panel, points, view, shadow=False)
-    _draw_contacts(panel, sequence, frame, view)
+    _draw_contacts(panel, points, contact, view)
     return panel
 
 
@@ -54,11 +63,15 @@ def _draw_bones(
             canvas.draw_dot(panel, pixels[child], colour, width // 2 + 1)
 
 
-def _draw_contacts(panel: canvas.Picture, sequence: SmplSequence, frame: int, view: View) -> None:
+def _draw_contacts(
+    panel: canvas.Picture,
+    points: Float[np.ndarray, "29 3"],
+    contact: Int[np.ndarray, "4"],
+    view: View,
+) -> None:
     """Draw a bright ring under each planted foot."""
     for side, names in enumerate(FEET):
-        states = sequence.contact[frame, 2 * side : 2 * side + 2]
-        if (states == PLANTED).any():
-            foot = np.mean([sequence.keypoints_w[frame, KEYPOINT_NAMES.index(n)] for n in names], 0)
+        if (contact[2 * side : 2 * side + 2] == PLANTED).any():
+            foot = np.mean([points[KEYPOINT_NAMES.index(name)] for name in names], 0)
             at = view.project(foot * [1.0, 1.0, 0.0])
             canvas.draw_dot(panel, at, (120, 230, 140), max(3, panel.shape[0] // 90))

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robojackson.motion.reference_motion import ReferenceMotion
+from robojackson.motion.smpl_sequence import SmplSequence
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Timeline:
         frame: Frame of the source clip.
         rollout: Step of the trained robot's rollout; its last one after the end.
         ended: Whether the rollout is over.
+        cycle_frames: Places in the clip, frames, where a cycle begins and where the next one does;
+            equal where nothing repeats.
     """
 
     time_s: Float[np.ndarray, " N"]
@@ -32,6 +35,7 @@ class Timeline:
     frame: Int[np.ndarray, " N"]
     rollout: Int[np.ndarray, " N"]
     ended: Bool[np.ndarray, " N"]
+    cycle_frames: tuple[float, float] = (0.0, 0.0)
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -51,7 +55,9 @@ def timeline(
     elapsed = np.floor(time_s / reference.dt + 1e-6).astype(int)
     cycle = elapsed // len(reference) if reference.cyclic else np.zeros_like(elapsed)
     step = np.minimum(elapsed - cycle * len(reference), len(reference) - 1)
-    frame = np.round(np.asarray(reference.source_time_s)[step] * source_fps).astype(int)
+    source = np.asarray(reference.source_time_s) * source_fps
+    frame = np.round(source[step]).astype(int)
+    ends = np.append(source, source[-1] + np.diff(source)[-1:])[[0, -1]]
     return Timeline(
         time_s=time_s,
         step=step,
@@ -59,6 +65,7 @@ def timeline(
         frame=np.clip(frame, 0, source_frames - 1),
         rollout=np.clip(elapsed, 0, max(rollout_steps - 1, 0)),
         ended=elapsed >= rollout_steps,
+        cycle_frames=(float(ends[0]), float(ends[1])) if reference.cyclic else (0.0, 0.0),
     )
 
 
@@ -106,4 +113,19 @@ def reference_qpos(reference: ReferenceMotion, when: Timeline) -> Float[np.ndarr
     qpos = np.array(reference.qpos, dtype=float)[when.step]
     qpos[:, :3] += when.cycle[:, None] * np.asarray(reference.cycle_offset)
     result: np.ndarray = qpos
+    return result
+
+
+def person_points(sequence: SmplSequence, when: Timeline) -> Float[np.ndarray, "N 29 3"]:
+    """Return the person's keypoints at each picture, metres, moved on over the floor by the cycles
+    before: by the path of the pelvis in one, at an even speed past the end of the clip."""
+    points = np.asarray(sequence.keypoints_w, float)
+    floor = points[:, 0, :2]
+    path = np.concatenate([floor, 2 * floor[-1:] - floor[-2:][:1]])
+    begin, end = (
+        [np.interp(at, np.arange(len(path)), axis) for axis in path.T] for at in when.cycle_frames
+    )
+    travel = np.append(np.subtract(end, begin), 0.0)
+    shown = points[np.minimum(when.frame, len(points) - 1)]
+    result: np.ndarray = shown + when.cycle[:, None, None] * travel
     return result

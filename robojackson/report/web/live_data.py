@@ -36,6 +36,7 @@ from robojackson.rl.trackers.regulator_tracker import RegulatorTracker
 from robojackson.robot.body_states import solid_geoms
 from robojackson.robot.fall import Fall
 from robojackson.robot.model import Robot
+from robojackson.robot.model_files import FAULTS, first_line
 from robojackson.robot.names import PELVIS
 
 LARGEST, TINY = 32767, 1e-30
@@ -107,6 +108,10 @@ def why_not_live(policy: Evaluated | None, robot: Robot) -> str:
         return f"a browser cannot run the control law {law}"
     if _has_colliding_meshes(robot.model):
         return f"a browser cannot run robot {robot.description.name}, whose meshes collide"
+    try:
+        live_model(robot)
+    except FAULTS as cause:
+        return f"a browser cannot run robot {robot.description.name}: {first_line(cause)}"
     return ""
 
 

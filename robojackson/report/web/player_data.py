@@ -16,7 +16,13 @@ from robojackson.mocap.reprojection import weak_frames
 from robojackson.motion.landmark_track import LandmarkTrack
 from robojackson.motion.reference_motion import ReferenceMotion
 from robojackson.motion.smpl_sequence import AIR, SmplSequence
-from robojackson.report.video.timeline import Timeline, cut_note, reference_qpos, timeline
+from robojackson.report.video.timeline import (
+    Timeline,
+    cut_note,
+    person_points,
+    reference_qpos,
+    timeline,
+)
 from robojackson.report.web.pane_camera import followed, followed_beside
 from robojackson.report.web.shapes import body_poses, packed, person_shape, robot_shape
 from robojackson.robot.model import Robot
@@ -96,7 +102,7 @@ def player(
     target = reference_qpos(reference, when)
     poses, sites = body_poses(robot.model, target)
     sites = sites[:, robot.keypoint_sites]
-    points = np.asarray(sequence.keypoints_w, float)[np.minimum(when.frame, len(sequence) - 1)]
+    points = person_points(sequence, when)
     seen = followed(sites, target[:, :3], fps)
     data: dict[str, object] = {
         "fps": fps,

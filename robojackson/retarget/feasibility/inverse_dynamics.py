@@ -154,9 +154,9 @@ def directions(robot: Robot) -> Float[np.ndarray, "C 3 E"]:
 
 @once_a_robot
 def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
-    """Return the sliding friction of each sole on the floor, as MuJoCo pairs geoms: the larger of
-    the two, or that of the one with the higher priority. Of a foot's geoms the most slippery
-    counts."""
+    """Return the sliding friction of each sole on the floor, as MuJoCo pairs geoms: that of their
+    pair, else the larger of the two, or that of the one with the higher priority. Of a foot's geoms
+    the most slippery counts."""
     model = robot.model
     touches = solid_geoms(model)
     plane = model.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
@@ -174,6 +174,11 @@ def sole_friction(robot: Robot) -> Float[np.ndarray, " C"]:
 
 
 def _pair_friction(model: mujoco.MjModel, first: int, second: int) -> float:
+    one, other = model.pair_geom1, model.pair_geom2
+    is_own = ((one == first) & (other == second)) | ((one == second) & (other == first))
+    own = np.flatnonzero(is_own)
+    if len(own):
+        return float(model.pair_friction[own[0], 0])
     rank, slides = model.geom_priority, model.geom_friction[:, 0]
     if rank[first] != rank[second]:
         return float(slides[first if rank[first] > rank[second] else second])

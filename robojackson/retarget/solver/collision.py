@@ -16,6 +16,8 @@ from robojackson.robot.model import Robot
 from robojackson.robot.tree_kinematics import Posed, Tree, placed
 
 _FLOOR_BIT = 1 << 30
+_APART_M = 1e3
+"""Depth that a pair which must not meet never reaches."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class _Models:
         if (clearance, feet) not in self._made:
             model = copy.copy(self._robot.model)
             model.geom_margin[:] = clearance
+            model.pair_margin[:] = clearance
             if not feet:
                 _lift_feet(model, self._robot.foot_bodies)
             self._made[clearance, feet] = model
@@ -144,6 +147,8 @@ def _lift_feet(model: mujoco.MjModel, feet: Int[np.ndarray, " F"]) -> None:
     floored = (meets != 0).any(axis=0) & ~foot & ~world
     model.geom_contype[world], model.geom_conaffinity[world] = 0, _FLOOR_BIT
     model.geom_contype[floored] |= _FLOOR_BIT
+    first, second = model.pair_geom1, model.pair_geom2
+    model.pair_margin[(world[first] & foot[second]) | (foot[first] & world[second])] = -_APART_M
 
 
 def _none() -> Touches:

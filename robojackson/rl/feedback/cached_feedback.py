@@ -51,7 +51,9 @@ DAMAGED = (
     *(BadZipFile, zlib.error, tokenize.TokenError),
 )
 """What reading a damaged file raises: it is computed again."""
-VARIED = ("body_mass", "body_ipos", "body_inertia", "geom_friction", "dof_armature")
+VARIED = (
+    *("body_mass", "body_ipos", "body_inertia", "geom_friction", "pair_friction", "dof_armature"),
+)
 """Arrays of a model that `variation` changes."""
 NAMED_FACTOR = 4.0
 """`robust_action_factor` by which gains are named, which do not depend on it: that of the G1 when

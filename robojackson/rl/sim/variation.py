@@ -22,7 +22,7 @@ class Variation:
     """Physics that differ from the stock robot's.
 
     Attributes:
-        friction: Factor on the friction of all geoms.
+        friction: Factor on the friction of all geoms and pairs.
         mass: Factor on mass and inertia of all bodies.
         com: Shift of the root body's centre of mass, m.
         gains: Factor on both gains of the PD law.
@@ -87,6 +87,7 @@ def varied_models(
 def _vary(model: mujoco.MjModel, robot: Robot, variation: Variation) -> None:
     """Change a model in place."""
     model.geom_friction[:] *= variation.friction
+    model.pair_friction[:] *= variation.friction
     if variation.timestep is not None:
         model.opt.timestep = variation.timestep
     if variation.integrator is not None:
