@@ -17,11 +17,12 @@ def find(
     query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
     top: Annotated[int | None, typer.Option(min=1, help="How many videos to assess.")] = None,
     source: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md)."
+            help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md); "
+            "without it that of the dance in dances.yaml, else youtube."
         ),
-    ] = "youtube",
+    ] = None,
     address: Annotated[
         str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
     ] = "",
