@@ -11,11 +11,12 @@ from functools import cache
 from typing import Any
 
 from prefect import flow
+from prefect.client.schemas.objects import FlowRun
 from prefect.deployments import arun_deployment
 from pydantic import TypeAdapter
 
 from flows.runtime.tracebacks import without_tracebacks
-from flows.study.run_watcher import RunWatcher
+from flows.study.run_watcher import RunWatcher, cancel_waiting
 from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.model import RobotDescription
@@ -119,6 +120,7 @@ async def run_on_worker(requested: Cell) -> Result:
     store.
 
     Raises:
+        CancelledError: the study is cancelled, and its run with it, unless a worker has begun it.
         TrainingCrashed: it did not end well; a failed child does not raise by itself.
         StoreError: it ended well and left nothing in this store; the message names why.
     """
@@ -128,10 +130,7 @@ async def run_on_worker(requested: Cell) -> Result:
     for _ in range(1 + requested.retries):
         given = replace(requested, timeout_minutes=left_s / 60)
         plain = TypeAdapter(Cell).dump_python(given, mode="json")
-        begun = await arun_deployment(
-            DEPLOYMENT, parameters={"cell": plain}, flow_run_name=requested.name, timeout=0
-        )
-        run = await WATCHER.of(begun)
+        run = await _ended_on_worker(requested.name, plain)
         left_s -= run.total_run_time.total_seconds()
         if run.state is None or not run.state.is_crashed() or left_s <= 0:
             break
@@ -139,6 +138,18 @@ async def run_on_worker(requested: Cell) -> Result:
         said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"
         raise TrainingCrashed(f"{requested.name} on a worker: {said}")
     return await asyncio.to_thread(published, requested, _run_id(requested))
+
+
+async def _ended_on_worker(name: str, plain: dict[str, Any]) -> FlowRun:
+    """Return a run of a cell as it ended on a worker."""
+    creating: asyncio.Task[FlowRun] = asyncio.create_task(
+        arun_deployment(DEPLOYMENT, parameters={"cell": plain}, flow_run_name=name, timeout=0)
+    )
+    try:
+        return await WATCHER.of(await asyncio.shield(creating))
+    except asyncio.CancelledError:
+        await cancel_waiting((await creating).id)
+        raise
 
 
 def is_recorded(requested: Cell) -> bool:

@@ -16,7 +16,8 @@ from prefect.client.schemas.filters import (
     FlowRunFilterState,
     FlowRunFilterStateType,
 )
-from prefect.client.schemas.objects import TERMINAL_STATES, FlowRun
+from prefect.client.schemas.objects import TERMINAL_STATES, FlowRun, StateType
+from prefect.states import Cancelling
 
 from robojackson.errors import TrainingCrashed
 
@@ -29,6 +30,9 @@ LOOKS = 15
 ends."""
 MOST = 200
 """Runs that the server returns at a time."""
+WAITING = (StateType.SCHEDULED, StateType.PENDING)
+"""States of a run that no worker has begun; the server cancels it at once where none took it."""
+CANCELLED = "the study that waited for it was cancelled"
 log = logging.getLogger(__name__)
 
 
@@ -93,6 +97,20 @@ class RunWatcher:
         for waits in self._waiting.values():
             if not waits.done():
                 waits.set_exception(cause)
+
+
+async def cancel_waiting(run_id: UUID) -> None:
+    """Cancel a run that no worker has begun; one that is begun goes on.
+
+    A server that does not answer is logged: its run stays in the queue.
+    """
+    try:
+        async with get_client() as client:
+            run = await client.read_flow_run(run_id)
+            if run.state is not None and run.state.type in WAITING:
+                await client.set_flow_run_state(run_id, Cancelling(message=CANCELLED))
+    except Exception as cause:
+        log.warning("the run %s on a worker cannot be cancelled: %s", run_id, cause)
 
 
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:

@@ -1,6 +1,7 @@
 """Waiting for runs on workers: one question for all of them, and patience with the server."""
 
 import asyncio
+from typing import Any
 from uuid import UUID, uuid4
 
 import pytest
@@ -8,7 +9,7 @@ from prefect import flow
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.filters import FlowRunFilter
 from prefect.client.schemas.objects import FlowRun
-from prefect.states import Completed, Scheduled
+from prefect.states import Completed, Pending, Running, Scheduled
 
 from flows.study import run_watcher
 from robojackson.errors import TrainingCrashed
@@ -123,6 +124,24 @@ def test_runs_are_looked_up_two_hundred_at_a_time(quick: pytest.MonkeyPatch) -> 
     quick.setattr(run_watcher, "get_client", Client)
     assert asyncio.run(run_watcher._existing(ids)) == set(ids)
     assert requests == [(200, 200), (200, 200), (50, 200)]
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("state", "expected"), [(Scheduled, "CANCELLED"), (Pending, "CANCELLING"), (Running, "RUNNING")]
+)
+def test_a_run_is_cancelled_unless_a_worker_has_begun_it(
+    state: Any, expected: str, prefect_server: None
+) -> None:
+    async def cancelled() -> str:
+        async with get_client() as client:
+            run = await client.create_flow_run(flow(lambda: None, name="nothing"), state=state())
+            await run_watcher.cancel_waiting(run.id)
+            ended = await client.read_flow_run(run.id)
+            assert ended.state is not None
+            return ended.state.type.value
+
+    assert asyncio.run(cancelled()) == expected
 
 
 @pytest.mark.medium
