@@ -52,7 +52,7 @@ def test_a_folder_that_may_not_be_read_is_no_empty_one(
         return listed(self)
 
     monkeypatch.setattr(Path, "iterdir", refused)
-    with pytest.raises(StoreError, match="cannot list .*: Permission denied: .*runs"):
+    with pytest.raises(StoreError, match=r"cannot list .*: Permission denied: .*runs"):
         store.list("runs")
-    with pytest.raises(BackupFailed, match="cannot list .*: Permission denied: .*runs"):
+    with pytest.raises(BackupFailed, match=r"cannot list .*: Permission denied: .*runs"):
         entries(store, SQLite(tmp_path / "absent.db"))
