@@ -16,7 +16,7 @@ from prefect.deployments import arun_deployment
 from pydantic import TypeAdapter
 
 from flows.runtime.tracebacks import without_tracebacks
-from flows.study.run_watcher import RunWatcher, cancel_waiting
+from flows.study.run_watcher import RunWatcher
 from robojackson.errors import TrainingCrashed, TrainingFailed
 from robojackson.pipeline.robot_descriptions import describe_robot
 from robojackson.robot.model import RobotDescription
@@ -146,10 +146,11 @@ async def _ended_on_worker(name: str, plain: dict[str, Any]) -> FlowRun:
         arun_deployment(DEPLOYMENT, parameters={"cell": plain}, flow_run_name=name, timeout=0)
     )
     try:
-        return await WATCHER.of(await asyncio.shield(creating))
+        begun = await asyncio.shield(creating)
     except asyncio.CancelledError:
-        await cancel_waiting((await creating).id)
+        await WATCHER.cancel((await creating).id)
         raise
+    return await WATCHER.of(begun)
 
 
 def is_recorded(requested: Cell) -> bool:

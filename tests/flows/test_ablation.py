@@ -19,6 +19,7 @@ from prefect.states import Completed, Crashed, Failed, Running
 
 from configs.study_config import Setup, Study
 from flows import ablation, cells
+from flows.study import run_watcher
 from robojackson.errors import (
     BadConfiguration,
     DeploymentFailed,
@@ -266,10 +267,10 @@ def test_a_cancelled_study_cancels_its_cells(
     started: list[str] = []
     monkeypatch.setattr(cells, "arun_deployment", Slow())
     monkeypatch.setattr(cells, "is_recorded", lambda cell: False)
-    monkeypatch.setattr(cells, "cancel_waiting", cancelled)
+    monkeypatch.setattr(run_watcher, "_cancel_waiting", cancelled)
     with pytest.raises(asyncio.CancelledError):
         asyncio.run(interrupted())
-    cancelled.assert_awaited_once_with(7)
+    cancelled.assert_awaited_once_with([7])
 
 
 def test_a_cell_that_kills_every_worker_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
