@@ -119,7 +119,7 @@ def _rows(connection: "DuckDBPyConnection", sql: str, given: Given, most: int | 
     return [dict(zip(names, map(_plain, row), strict=True)) for row in found]
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return a value of DuckDB with its decimals as numbers and its bytes in hexadecimal."""
     if isinstance(value, Decimal):
         return int(value) if value == value.to_integral_value() else float(value)

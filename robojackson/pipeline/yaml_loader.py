@@ -67,7 +67,7 @@ def load(
         raise refusal(cls, cause, where) from cause
 
 
-def own_values(name_or_path: str | Path) -> dict[str, Any]:
+def own_values(name_or_path: str | Path) -> dict[str, object]:
     """Return the values of a file alone, without those of a file that it extends; raise as
     `load`."""
     return _read(find(name_or_path))
