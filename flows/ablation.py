@@ -17,8 +17,9 @@ from prefect.context import SyncClientContext
 from prefect.logging import get_run_logger
 
 from configs.study_config import Move, Study
-from flows.cells import EXECUTORS
+from flows.cells import DEPLOYMENT, EXECUTORS
 from flows.runtime.launch import launch
+from flows.runtime.prefect_server import require_deployment
 from flows.runtime.run_artifacts import show_study
 from flows.runtime.tracebacks import without_tracebacks
 from flows.study.progress_table import ProgressTable
@@ -67,9 +68,12 @@ async def ablation(study: Study) -> Facts:
         UnknownName, BadConfiguration: a move or setup does not exist; no cell was started.
         BadPolicy: a setup starts from a walker and the robot has none; no cell was started.
         RejectedReference: the gate refuses motions; no cell was started.
+        DeploymentFailed: its cells are for workers, and no deployment takes them; nothing was made.
         StudyFailed: cells failed; the message names each.
     """
     without_tracebacks()
+    if study.executor == "work-pool":
+        await require_deployment(DEPLOYMENT)
     sweep(Store.from_environment())
     moves = {name: load(Move, f"moves/{name}") for name in study.moves}
     trainings = trainings_of(study, describe_robot(study.robot))
@@ -216,4 +220,6 @@ def _slots(study: Study) -> int:
 
 
 def _line(cause: BaseException) -> str:
-    return shorten(str(cause), REASON, placeholder=" ...") or type(cause).__name__
+    """Return why a cell failed; some errors of Prefect have no message but "None"."""
+    said = shorten(str(cause), REASON, placeholder=" ...")
+    return type(cause).__name__ if said in ("", "None") else said

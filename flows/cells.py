@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from prefect import flow
+from prefect.client.schemas.objects import FlowRun
 from prefect.deployments import arun_deployment
 from pydantic import TypeAdapter
 
@@ -119,6 +120,7 @@ async def run_on_worker(requested: Cell) -> Result:
     store.
 
     Raises:
+        CancelledError: the study is cancelled, and its run with it, unless a worker has begun it.
         TrainingCrashed: it did not end well; a failed child does not raise by itself.
         StoreError: it ended well and left nothing in this store; the message names why.
     """
@@ -128,10 +130,7 @@ async def run_on_worker(requested: Cell) -> Result:
     for _ in range(1 + requested.retries):
         given = replace(requested, timeout_minutes=left_s / 60)
         plain = TypeAdapter(Cell).dump_python(given, mode="json")
-        begun = await arun_deployment(
-            DEPLOYMENT, parameters={"cell": plain}, flow_run_name=requested.name, timeout=0
-        )
-        run = await WATCHER.of(begun)
+        run = await _ended_on_worker(requested.name, plain)
         left_s -= run.total_run_time.total_seconds()
         if run.state is None or not run.state.is_crashed() or left_s <= 0:
             break
@@ -139,6 +138,19 @@ async def run_on_worker(requested: Cell) -> Result:
         said = "has no state" if run.state is None else f"{run.state.name}: {run.state.message}"
         raise TrainingCrashed(f"{requested.name} on a worker: {said}")
     return await asyncio.to_thread(published, requested, _run_id(requested))
+
+
+async def _ended_on_worker(name: str, plain: dict[str, Any]) -> FlowRun:
+    """Return a run of a cell as it ended on a worker."""
+    creating: asyncio.Task[FlowRun] = asyncio.create_task(
+        arun_deployment(DEPLOYMENT, parameters={"cell": plain}, flow_run_name=name, timeout=0)
+    )
+    try:
+        begun = await asyncio.shield(creating)
+    except asyncio.CancelledError:
+        await WATCHER.cancel((await creating).id)
+        raise
+    return await WATCHER.of(begun)
 
 
 def is_recorded(requested: Cell) -> bool:

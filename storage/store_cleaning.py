@@ -4,7 +4,9 @@ A folder of work is removed under its locks, as in `leftovers`. The other kinds 
 while a process works with the store: it may know of results that no record names yet.
 """
 
+import json
 import os
+import re
 import shutil
 from collections.abc import Collection
 from contextlib import ExitStack, suppress
@@ -14,9 +16,23 @@ from pathlib import Path
 from robojackson.errors import StoreError
 from robojackson.files.local_folder import files_in, folder_of
 from robojackson.pipeline.folder_lock import locked
+from storage.run_catalogue import FOLDER as RUNS
+from storage.stage_records import FOLDER as RECORDS
 from storage.store import DEFAULT_ROOT, VARIABLE, Store
-from storage.store_inventory import ARTIFACT, LOCKS, PAGES, WORK, Item, Kind, inventory, root_of
+from storage.store_inventory import (
+    ARTIFACT,
+    LOCKS,
+    PAGES,
+    WORK,
+    Item,
+    Kind,
+    content_of,
+    inventory,
+    root_of,
+)
 
+PAGE = re.compile(rb'"' + PAGES.encode() + rb'/[^/"]+(?=/)')
+"""The folder of a dance in the record of a run, after the quotation mark of its JSON text."""
 USUAL: tuple[Kind, ...] = ("work", "unused")
 """Kinds that nothing is lost with but time."""
 IDLE = {"server", "clean", "doctor", "metrics", "catalogue", "robots", "deploy"}
@@ -59,10 +75,30 @@ def plan(store: Store, kinds: Collection[Kind], older_than_s: float) -> Cleaning
     return Cleaning(found, _without_named(store, old), users_of(root_of(store)))
 
 
-def remove(store: Store, cleaning: Cleaning) -> list[Item]:
-    """Remove what a plan lists; return what was removed. What is locked meanwhile stays."""
+@dataclass(frozen=True)
+class Removal:
+    """Result of a cleaning.
+
+    Attributes:
+        gone: What was removed.
+        failed: Why something could not be removed, by its key.
+    """
+
+    gone: list[Item]
+    failed: dict[str, str]
+
+
+def remove(store: Store, cleaning: Cleaning) -> Removal:
+    """Remove what a plan lists. What is locked meanwhile stays."""
     root = root_of(store)
-    return [item for item in cleaning.going if _removed(root / item.key, item.kind == WORK)]
+    done = Removal([], {})
+    for item in cleaning.going:
+        reason = _remove(root / item.key, item.kind == WORK)
+        if reason:
+            done.failed[item.key] = reason
+        elif not (root / item.key).exists():
+            done.gone.append(item)
+    return done
 
 
 def users_of(root: Path) -> list[str]:
@@ -83,20 +119,18 @@ def _without_named(store: Store, old: list[Item]) -> list[Item]:
     root, going = root_of(store), {item.key for item in old}
     stay = [
         path
-        for folder in ("records", "runs")
+        for folder in (RECORDS, RUNS)
         for path in files_in(root / folder)
         if path.suffix == ".json" and path.relative_to(root).as_posix() not in going
     ]
-    named = {found.decode() for path in stay for found in ARTIFACT.findall(_content(path))}
-    results = {item.key for item in old if not item.key.startswith(f"{PAGES}/")} & named
-    return [item for item in old if item.key not in results]
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        return b""
+    named: set[str] = set()
+    for path in stay:
+        content = content_of(path)
+        results = {found.decode() for found in ARTIFACT.findall(content)}
+        named |= {key for key in results if not key.startswith(f"{PAGES}/")}
+        if path.is_relative_to(root / RUNS):
+            named |= {json.loads(found + b'"') for found in PAGE.findall(content)}
+    return [item for item in old if item.key not in named]
 
 
 def _command(words: list[str]) -> str:
@@ -118,14 +152,17 @@ def _store_of(process: Path) -> Path:
     return (Path(os.readlink(process / "cwd")) / (folder_of(root) or root)).resolve()
 
 
-def _removed(path: Path, is_work: bool) -> bool:
-    """Remove a file or a folder; whether it is gone."""
-    with suppress(OSError, StoreError), ExitStack() as held:
-        if is_work and path.is_dir():
-            for name in LOCKS:
-                held.enter_context(locked(path, name))
-        if path.is_dir():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
-    return not path.exists()
+def _remove(path: Path, is_work: bool) -> str:
+    """Remove a file or a folder; return why it cannot be, nothing of one that is locked."""
+    try:
+        with suppress(StoreError, FileNotFoundError), ExitStack() as held:
+            if is_work and path.is_dir():
+                for name in LOCKS:
+                    held.enter_context(locked(path, name))
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+    except OSError as cause:
+        return cause.strerror or str(cause)
+    return ""

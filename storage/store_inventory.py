@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Literal
 
 from robojackson.errors import StoreError
-from robojackson.files.local_folder import TEMPORARY, LocalFolder, files_in
+from robojackson.files.file_tree import in_one_line
+from robojackson.files.local_folder import OF_THE_DISK, TEMPORARY, LocalFolder, files_in
 from robojackson.rl.tensorboard_log import LOGS
 from storage import candidate_catalogue, run_catalogue, stage_records
 from storage.leftovers import PROCESS, TASK, is_held
@@ -64,7 +65,8 @@ def inventory(store: Store) -> list[Item]:
     """Return everything in a store; an artifact is `unused` or in the kind that refers to it.
 
     Raises:
-        StoreError: the store is no folder of this machine.
+        StoreError: the store is no folder of this machine, or something in it cannot be read: what
+            that refers to is not known.
     """
     root = root_of(store)
     named = _references(store, root)
@@ -90,7 +92,7 @@ def root_of(store: Store) -> Path:
 
 def _entries(root: Path) -> Iterator[Path]:
     """Yield the folders of work, artifacts, pages and downloads, and all single files."""
-    for path in _inside(root):
+    for path in (path for path in _inside(root) if path.name != OF_THE_DISK):
         if not path.is_dir():
             yield path
         elif path.name == WORK:
@@ -118,15 +120,22 @@ def _has_artifacts(folder: Path) -> bool:
 
 def _inside(folder: Path) -> list[Path]:
     """Return what is in a folder, in order; nothing where it has gone meanwhile."""
-    with suppress(FileNotFoundError, NotADirectoryError):
+    with in_one_line(f"cannot list {folder}"), suppress(FileNotFoundError, NotADirectoryError):
         return sorted(folder.iterdir())
     return []
 
 
 def _files(folder: Path) -> list[Path]:
     """Return the files of a folder that is walked while others work in it; links are not left."""
-    found = (Path(inner, name) for inner, _, names in os.walk(folder) for name in names)
+    walk = os.walk(folder, onerror=_refuse)
+    found = (Path(inner, name) for inner, _, names in walk for name in names)
     return [path for path in found if path.is_file()]
+
+
+def _refuse(cause: OSError) -> None:
+    """Raise what keeps a folder from being listed, unless it has gone meanwhile."""
+    if not isinstance(cause, FileNotFoundError | NotADirectoryError):
+        raise StoreError(f"cannot list {cause.filename}: {cause.strerror}") from cause
 
 
 def _kind_of(root: Path, entry: Path, named: Callable[[str], Kind | None]) -> Kind:
@@ -148,7 +157,9 @@ def _kind_of(root: Path, entry: Path, named: Callable[[str], Kind | None]) -> Ki
 def _references(store: Store, root: Path) -> Callable[[str], Kind | None]:
     """Return what finds the kind that refers to an artifact: what is kept longest decides."""
     found: dict[Kind, set[str]] = {kind: set() for kind in REFERRING}
-    for path in (path for path in files_in(root) if path.suffix == ".json"):
+    with in_one_line(f"cannot list {root}"):
+        texts = [path for path in files_in(root) if path.suffix == ".json"]
+    for path in texts:
         kind = _kind_of_text(path.relative_to(root))
         if kind in REFERRING:
             found[kind] |= _named_in(path)
@@ -172,12 +183,19 @@ def _kind_of_text(path: Path) -> Kind:
 
 
 def _named_in(path: Path) -> set[str]:
-    if not path.is_file():
-        return set()
-    try:
-        return {match.decode() for match in ARTIFACT.findall(path.read_bytes())}
-    except (OSError, UnicodeDecodeError):
-        return set()
+    return {match.decode() for match in ARTIFACT.findall(content_of(path))}
+
+
+def content_of(path: Path) -> bytes:
+    """Return the content of a file; nothing where it has gone meanwhile, or is a pipe.
+
+    Raises:
+        StoreError: it cannot be read.
+    """
+    with in_one_line(f"cannot read {path}"), suppress(FileNotFoundError):
+        if path.is_file():
+            return path.read_bytes()
+    return b""
 
 
 def _item(root: Path, path: Path, kind: Kind) -> Item | None:

@@ -80,7 +80,7 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
         key = given[table].key
         rows = tables.decode_rows(schema, store.read(key), store.address(key))
         made[table] = _put(
-            store, place.key(table), tables.encode_rows(schema, _relabelled(place, rows))
+            store, place.key(table), tables.encode_rows(schema, relabelled(place, rows))
         )
     for key in _outdated(store, place):
         for old in (key, note_key(replace(place, run_id=_run(key)))):
@@ -91,7 +91,7 @@ def write(store: Store, place: Place, given: Mapping[str, Artifact]) -> dict[str
 
 def write_beats(store: Store, place: Place, rows: list[dict[str, Any]]) -> Artifact:
     """Write how the motions of a dance meet its music."""
-    content = tables.encode_rows(BEAT_RECORD, _relabelled(place, rows))
+    content = tables.encode_rows(BEAT_RECORD, relabelled(place, rows))
     return _put(store, place.key("beats"), content)
 
 
@@ -182,7 +182,7 @@ def _is_joined(key: str) -> bool:
     return "/move=" not in key  # as docs/scaling.md joins the cells of a study
 
 
-def _relabelled(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def relabelled(place: Place, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return rows under the names of this cell: a cached table may have been made under others."""
     names = {"run_id": place.run_id, "move": place.move, "setup": place.setup, "seed": place.seed}
     return [{**row, **names} for row in rows]

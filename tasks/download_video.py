@@ -7,6 +7,7 @@ waits for the other. What an interrupted download left is continued.
 
 import hashlib
 import json
+import re
 import shutil
 import sys
 from dataclasses import asdict, dataclass, field
@@ -16,8 +17,9 @@ from typing import Any
 from robojackson.cli.lifetime.video_process import probed
 from robojackson.clips.video import VideoLimits
 from robojackson.clips.web.download_formats import FormatConfig, Purpose
+from robojackson.clips.web.file_version import SUFFIX
 from robojackson.clips.web.untrusted_text import clean_text, in_markdown, safe_name
-from robojackson.clips.web.video_candidate import VideoCandidate
+from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import Offer, WebConfig, fetch, offer
 from robojackson.errors import StoreError, UnreadableVideo
 from robojackson.pipeline.folder_lock import FOR_EVER, locked
@@ -76,8 +78,13 @@ def take_file(file: SourceFile) -> Artifact:
 
 
 def stored_video(store: Store, video: WebVideo) -> Artifact | None:
-    """Return an earlier download of a video, of several formats the one with the largest file."""
-    notes = [key for key in store.list(video.folder) if key.endswith(NOTE)]
+    """Return an earlier download of a video, of several formats the one with the largest file; of
+    an address whose server does not answer, that of any version of its file."""
+    keys = store.list(video.folder)
+    if not keys and video.source == GENERIC:
+        of_a_version = re.compile(re.escape(video.folder) + SUFFIX.pattern + "/")
+        keys = [key for key in store.list(f"{FOLDER}/{GENERIC}") if of_a_version.match(key)]
+    notes = [key for key in keys if key.endswith(NOTE)]
     found = [had for note in notes if (had := _noted(store, note)) is not None]
     return max(found, key=lambda had: len(store.read(had.key)), default=None)
 

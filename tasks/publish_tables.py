@@ -1,4 +1,5 @@
-"""The tables of a cell, put where questions find them, with where they come from beside them."""
+"""The tables of a cell, put where questions find them, with where they come from beside them; and
+those of a pass, under the names of its run."""
 
 import json
 import os
@@ -12,13 +13,16 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from robojackson.errors import StoreError
+from robojackson.files import tables
 from robojackson.files.json_types import to_json_types
 from robojackson.pipeline.app_folder import app_folder, is_checkout
 from robojackson.pipeline.robot_descriptions import describe_robot
 from storage import study_tables
 from storage.artifact import Artifact
 from storage.store import Store
+from storage.study_tables import Place
 from tasks.study_cell import Cell
+from tasks.train_policy import RunLabels
 
 Result = dict[str, Artifact]
 RESULT = "result"
@@ -74,9 +78,33 @@ def published(cell: Cell, run_id: str) -> Result:
         ) from cause
 
 
-def provenance(
-    cell: Cell, place: study_tables.Place, made: Mapping[str, Artifact]
-) -> dict[str, Any]:
+def place_of_pass(
+    made: Mapping[str, Artifact], labels: RunLabels, tracker: str | None, seed: int
+) -> Place:
+    """Return the names of the run of a pass in all of its tables.
+
+    Args:
+        made: What the stages made, by name.
+        tracker: The tracker that dances; None where a policy was trained.
+        seed: Seed of the training.
+    """
+    setup, seed = (tracker, 0) if tracker else (labels.setup, seed)
+    danced = made["evaluation" if tracker else "policy"]
+    run_id = f"{labels.move}-{setup}-s{seed}-{danced.sha256[:8]}"
+    return Place(study_tables.DANCES, labels.move, setup, seed, run_id)
+
+
+def content_at(place: Place, store: Store, name: str, artifact: Artifact) -> bytes:
+    """Return the content of an artifact, a table of a run under the names of this one: a recorded
+    stage may have made it for another dance of the same video."""
+    content, schema = store.read(artifact.key), study_tables.CELL.get(name)
+    if schema is None:
+        return content
+    rows = tables.decode_rows(schema, content, store.address(artifact.key))
+    return tables.encode_rows(schema, study_tables.relabelled(place, rows))
+
+
+def provenance(cell: Cell, place: Place, made: Mapping[str, Artifact]) -> dict[str, Any]:
     """Return where the numbers of a cell come from: code, configuration, inputs, machine, time."""
     return {
         **asdict(place),
@@ -94,8 +122,8 @@ def provenance(
     }
 
 
-def _place(cell: Cell, run_id: str) -> study_tables.Place:
-    return study_tables.Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
+def _place(cell: Cell, run_id: str) -> Place:
+    return Place(cell.study, cell.move, cell.setup, cell.seed, run_id)
 
 
 def _digests(made: Mapping[str, Artifact]) -> dict[str, str]:

@@ -29,7 +29,9 @@ from robojackson.robot.model import Robot, RobotDescription, load_robot
 from storage import artifact_tables
 from storage.artifact import Artifact
 from storage.store import Store
+from storage.study_tables import Place
 from tasks.probe_video import info_of
+from tasks.publish_tables import content_at
 from tasks.render_video import music_digest
 from tasks.runtime.code_digest import template_digests
 from tasks.runtime.run_logger import run_logger
@@ -94,25 +96,26 @@ def _models(parameters: Mapping[str, Any]) -> list[str]:
 
 @stage(models=_models)
 def write_page(
-    made: dict[str, Artifact], move: str, file: str, settings: PageSettings, folder: str = ""
+    made: dict[str, Artifact], place: Place, file: str, settings: PageSettings, folder: str = ""
 ) -> dict[str, Artifact]:
     """Write everything under `dances/<move>-<digest>/`; return it, `page`, `beats` and `live`.
 
     Args:
         made: What the other stages made, by name.
-        move: Name of the dance, for the folder.
+        place: Names of the run in its tables; its `move` names the folder, too.
         file: Name of the file that is danced; the same video may be stored under another.
         settings: Further inputs of the page.
         folder: Where to, instead of there.
     """
     if not folder:
         digest = hashlib.sha256("".join(a.sha256 for a in made.values()).encode()).hexdigest()
-        folder = f"dances/{move}-{digest[:8]}"
-    return _written(made, file, settings, folder)
+        folder = f"dances/{place.move}-{digest[:8]}"
+    return _written(made, place, file, settings, folder)
 
 
 def write_early_page(
     made: dict[str, Artifact],
+    place: Place,
     file: str,
     settings: PageSettings,
     folder: str,
@@ -121,21 +124,19 @@ def write_early_page(
     """Write a page that a later `write_page` into the same folder replaces; not a stage.
 
     Args:
-        made, file, settings, folder: See `write_page`; without `dance`, the page says that the
-            video is to come.
+        made, place, file, settings, folder: See `write_page`; the video, `dance`, may be to come.
         again: Whether a page that exists is written again.
-
     Returns:
         Address of the page; None where one exists that stays.
     """
     store = Store.from_environment()
     if store.exists(f"{folder}/{PAGE}") and not again:
         return None
-    return store.address(_written(made, file, settings, folder)["page"].key)
+    return store.address(_written(made, place, file, settings, folder)["page"].key)
 
 
 def _written(
-    made: dict[str, Artifact], file: str, settings: PageSettings, folder: str
+    made: dict[str, Artifact], place: Place, file: str, settings: PageSettings, folder: str
 ) -> dict[str, Artifact]:
     """Return the page and all files that belong to it, in a folder."""
     from robojackson.report.pages.page_content import page_content
@@ -154,7 +155,7 @@ def _written(
         run_logger().info("no live page: %s", why_not_live(run.policy, run.robot))
     text = render(page_content(results, made["dance"].name if "dance" in made else None))
     kept = {
-        name: store.put(f"{folder}/{artifact.name}", store.read(artifact.key))
+        name: store.put(f"{folder}/{artifact.name}", content_at(place, store, name, artifact))
         for name, artifact in made.items()
         if name not in LEFT_OUT
     }

@@ -2,7 +2,7 @@
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +12,7 @@ from robojackson.cli.console import CommandResult, command
 from robojackson.cli.options import Json
 
 if TYPE_CHECKING:
-    from storage.store_cleaning import Cleaning
+    from storage.store_cleaning import Cleaning, Removal
     from storage.store_inventory import Item
 
 DAY_S, MEGABYTE = 86_400.0, 1e6
@@ -50,24 +50,25 @@ def clean(
     process works on.
     """
     from storage.store import Store
-    from storage.store_cleaning import USUAL, plan, remove
+    from storage.store_cleaning import USUAL, Removal, plan, remove
     from storage.store_inventory import KINDS
 
     store = Store.from_environment()
     chosen = [kind for kind in KINDS if kind in (kinds or ())]
     found = plan(store, chosen or USUAL, older_than * DAY_S)
-    gone = remove(store, found) if delete else found.going
+    done = remove(store, found) if delete else Removal(found.going, {})
+    gone = done.gone
     data = {
         "store": store.root,
         "kinds": {kind: summary(found.items, kind) for kind in KINDS},
         "removed": delete,
         "items": [{"key": i.key, "kind": i.kind, "size_mb": _mb([i])} for i in gone],
         "size_mb": _mb(gone),
+        "failed": done.failed,
         "waiting": found.users,
     }
-    return CommandResult(
-        data, text=[*_table(found), "", *_closing(found, gone, delete, older_than)]
-    )
+    text = [*_table(found), "", *_closing(found, done, delete, older_than)]
+    return CommandResult(data, 1 if done.failed else 0, text)
 
 
 def summary(items: "Sequence[Item]", kind: str) -> dict[str, Any]:
@@ -93,20 +94,17 @@ def _table(found: "Cleaning") -> list[str]:
     return rows
 
 
-def _closing(
-    found: "Cleaning", gone: "Sequence[Item]", delete: bool, older_than: float
-) -> list[str]:
-    listed = [f"  {i.key}  {_mb([i]):,.1f} MB, {i.age_s / DAY_S:.0f} days" for i in gone]
-    rows = listed[:LONGEST_LIST]
-    if len(listed) > LONGEST_LIST:
-        rows.append(f"  and {len(listed) - LONGEST_LIST} more")
+def _closing(found: "Cleaning", done: "Removal", delete: bool, older_than: float) -> list[str]:
+    gone = done.gone
+    rows = _shortened(f"  {i.key}  {_mb([i]):,.1f} MB, {i.age_s / DAY_S:.0f} days" for i in gone)
+    rows += _shortened(f"could not be removed: {k} ({why})" for k, why in done.failed.items())
     if found.users and len(found.going) < len(found.old):
         rows.append(
             f"{_counted(len(found.old) - len(found.going))} left while the store is in use by "
             f"{', '.join(found.users)}."
         )
     size = f"{_counted(len(gone))}, {_mb(gone):,.1f} MB"
-    if not gone:
+    if not gone and not done.failed:
         what = "was removed" if delete else "would go"
         return [
             *rows,
@@ -120,6 +118,12 @@ def _closing(
     words = [word for word in sys.argv[1:] if word != "--json"]
     again = shlex.join([program(), *words, "--delete"])
     return [*rows, f"Would go: {size}. Nothing was removed.", f"next: {again}"]
+
+
+def _shortened(listed: Iterable[str]) -> list[str]:
+    rows = list(listed)
+    more = len(rows) - LONGEST_LIST
+    return rows if more <= 0 else [*rows[:LONGEST_LIST], f"  and {more} more"]
 
 
 def _counted(number: int) -> str:

@@ -17,11 +17,12 @@ def find(
     query: Annotated[str, typer.Argument(help="A dance; or the folder, or list, of the source.")],
     top: Annotated[int | None, typer.Option(min=1, help="How many videos to assess.")] = None,
     source: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md)."
+            help="youtube, folder, urls, site, server, or one that you add (docs/recipes.md); "
+            "without it that of the dance in dances.yaml, else youtube."
         ),
-    ] = "youtube",
+    ] = None,
     address: Annotated[
         str, typer.Option(help="Of the folder, list, site ({query} stands for it) or server.")
     ] = "",
@@ -86,18 +87,22 @@ def refresh(
 
 @command
 def catalogue(
-    dance: Annotated[str | None, typer.Option(help="Only this dance.")] = None,
+    dance: Annotated[
+        str | None, typer.Option(help="Only this dance, by its name or query.")
+    ] = None,
     sql: Annotated[
         str | None, typer.Option(help="A question to DuckDB about the table `candidates`.")
     ] = None,
     as_json: Json = False,
 ) -> CommandResult:
     """Show every video assessed so far, and why it was danced or not."""
+    from configs.dance_book import DanceBook
     from flows.cli.verdicts import catalogue_verdict
     from flows.search import ranking_table
     from robojackson.cli import console
     from robojackson.cli.cards import closing
     from robojackson.errors import BadConfiguration
+    from robojackson.pipeline.yaml_loader import load
     from storage import candidate_catalogue
     from storage.store import Store
 
@@ -111,6 +116,8 @@ def catalogue(
         text = console.table(named, list(found[0])) if found else ["no rows"]
         return CommandResult({"rows": found}, text=text)
     rows = candidate_catalogue.records(store, dance)
+    if not rows and dance:  # `find` records what the book names under its name
+        rows = candidate_catalogue.records(store, load(DanceBook, "dances").find(dance).name)
     if not rows:
         return CommandResult({"candidates": rows}, text=[empty_catalogue_text(dance)])
     verdict = catalogue_verdict(rows)

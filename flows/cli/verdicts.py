@@ -110,7 +110,10 @@ def refresh_verdict(done: Facts, robot: str | None = None) -> dict[str, Any]:
     if failed:
         return _closing("failed", sentence, command_line("refresh", *failed, *of_robot(robot)))
     name = (new or list(dances))[0]
-    following = command_line("train", dances[name]["reference"], "-o", name.replace(" ", "_"))
+    reference = dances[name]["reference"]
+    following = command_line("train", reference, "-o", name.replace(" ", "_"))
+    if "://" in reference:  # `train` reads files of this machine
+        following = command_line("dance", name, *of_robot(robot))
     return _closing("refreshed", sentence, following)
 
 

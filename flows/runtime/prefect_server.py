@@ -6,6 +6,7 @@ from contextlib import contextmanager
 
 from httpx import HTTPStatusError, TransportError
 from prefect.client.orchestration import get_client
+from prefect.exceptions import ObjectNotFound
 from prefect.settings import PREFECT_API_URL
 
 from robojackson.errors import DeploymentFailed
@@ -13,6 +14,7 @@ from robojackson.errors import DeploymentFailed
 EVERY_S = 0.5
 REFUSED = (401, 403)
 """HTTP codes with which a server refuses access."""
+NOT_FOUND = 404
 
 
 def require_server() -> None:
@@ -24,6 +26,25 @@ def require_server() -> None:
     if PREFECT_API_URL.value():
         with answering(), get_client(sync_client=True) as client:
             client.hello()
+
+
+async def require_deployment(name: str) -> None:
+    """Check that the server has a deployment, before work is done for its runs.
+
+    Raises:
+        DeploymentFailed: it does not have it, does not answer, or refuses us.
+    """
+    with answering():
+        async with get_client() as client:
+            try:
+                await client.read_deployment_by_name(name)
+            except ObjectNotFound as cause:
+                raise DeploymentFailed(
+                    f"{_named()} has no deployment {name}, whose runs workers take. Start a server "
+                    "(`robojackson server`), set PREFECT_API_URL to its address, register with "
+                    "`robojackson deploy`, then start a worker (`prefect worker start --pool "
+                    "training`); `--executor local` needs none of them"
+                ) from cause
 
 
 def await_server(seconds: float) -> None:
@@ -51,7 +72,7 @@ def answering() -> Iterator[None]:
     Raises:
         DeploymentFailed: it does not answer, or refuses access or a request.
     """
-    named = f"the Prefect server of PREFECT_API_URL={PREFECT_API_URL.value()}"
+    named = _named()
     try:
         yield
     except TransportError as cause:
@@ -67,4 +88,19 @@ def answering() -> Iterator[None]:
                 f"{named} refuses us ({code} {cause.response.reason_phrase}); "
                 "set PREFECT_API_AUTH_STRING to its user:password"
             ) from cause
+        if code == NOT_FOUND and (better := _with_api()):
+            raise DeploymentFailed(
+                f"{named} is no address of its API, which ends in /api: "
+                f"set PREFECT_API_URL={better}"
+            ) from cause
         raise DeploymentFailed(f"{named}: {cause}") from cause
+
+
+def _named() -> str:
+    return f"the Prefect server of PREFECT_API_URL={PREFECT_API_URL.value()}"
+
+
+def _with_api() -> str:
+    """Return the address of PREFECT_API_URL with the end that it lacks; empty where it has it."""
+    address = str(PREFECT_API_URL.value()).rstrip("/")
+    return "" if address.endswith("/api") else f"{address}/api"

@@ -1,6 +1,7 @@
 """When a dance was refreshed last for a robot, and what came of it: one JSON for each."""
 
 import json
+import logging
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -11,6 +12,8 @@ from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.run_names import slug_of
 from storage.store import Store
 
+log = logging.getLogger(__name__)
+
 KIND = "refresh"
 """Beginning of the ids of its runs in the catalogue."""
 FOLDER = "refresh"
@@ -19,7 +22,8 @@ SLACK = 0.1
 
 
 def is_due(store: Store, dance: Dance, robot: str, began: datetime) -> bool:
-    """Return whether the refresh before this one began long enough ago.
+    """Return whether the refresh before this one began long enough ago; after a note that cannot
+    be read, it is due.
 
     Args:
         robot: Name of the robot that the motions are for.
@@ -28,9 +32,13 @@ def is_due(store: Store, dance: Dance, robot: str, began: datetime) -> bool:
     key = _key(dance, robot)
     if not store.exists(key):
         return True
-    facts = json.loads(store.read(key))
-    last = datetime.fromisoformat(facts.get("started_at") or facts["finished_at"])
-    return began - last >= timedelta(days=dance.every_days * (1 - SLACK))
+    try:
+        facts = json.loads(store.read(key))
+        last = datetime.fromisoformat(facts.get("started_at") or facts["finished_at"])
+        return began - last >= timedelta(days=dance.every_days * (1 - SLACK))
+    except (ValueError, KeyError, TypeError, AttributeError) as cause:
+        log.warning("%s cannot be read (%s): the dance is due", store.address(key), cause)
+        return True
 
 
 def note(

@@ -21,29 +21,44 @@ from storage import candidate_catalogue
 from storage.store import Store
 
 log = logging.getLogger(__name__)
+YOUTUBE = "youtube"
 ALL = 10_000
 """Files of a folder are all assessed: they have no view counts."""
 
 
-def find_dance(query: str, source: str, address: str, top: int | None, config: FindConfig) -> Dance:
-    """Return the dance to look for; a query that `configs/dances.yaml` knows means that dance.
+def find_dance(
+    query: str, source: str | None, address: str, top: int | None, config: FindConfig
+) -> Dance:
+    """Return the dance to look for; without a source and an address, a query that the user's
+    dances know means that dance, with its own source, address and number of videos.
 
+    Args:
+        top: How many videos are assessed; None is the dance's own number.
     Raises:
         UnknownName: there is no such source.
         BadConfiguration: there is nothing to look for.
         SearchFailed: the folder or list is not there, or holds nothing.
     """
-    search = source_of(source).search
-    query = query.strip()
-    words = {"name": clean_text(query, 60) or source, "query": query}
-    dance = build(Dance, words | {"source": source, "address": address}, "find")
-    if source == "youtube":
-        dance = replace(load(DanceBook, "dances").find(query), source=source, address=address)
-    if source == folder.NAME:
-        folder.videos(query, address)
-    elif is_local(source):
-        search(query, address, 1, config.web, datetime.now(UTC))
-    return replace(dance, top=top or (ALL if source == folder.NAME else None))
+    dance = _requested(query.strip(), source, address)
+    search = source_of(dance.source).search
+    if dance.source == folder.NAME:
+        folder.videos(dance.full_query, dance.address)
+    elif is_local(dance.source):
+        search(dance.full_query, dance.address, 1, config.web, datetime.now(UTC))
+    return replace(dance, top=top or dance.top)
+
+
+def _requested(query: str, source: str | None, address: str) -> Dance:
+    """Return a dance of the book, or one that is made of the words."""
+    where = source or YOUTUBE
+    source_of(where)
+    if source is None and not address and query:
+        return load(DanceBook, "dances").find(query)
+    words = {"name": clean_text(query, 60) or where, "query": query}
+    dance = build(Dance, words | {"source": where, "address": address}, "find")
+    if where == YOUTUBE:
+        return replace(load(DanceBook, "dances").find(query), source=where, address=address)
+    return replace(dance, top=ALL if where == folder.NAME else None)
 
 
 def require_online(dance: Dance, config: FindConfig) -> None:

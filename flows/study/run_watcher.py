@@ -7,6 +7,7 @@ Prefect's own `run_deployment` polls each of its runs every 5 s: a thousand that
 import asyncio
 import logging
 import time
+from typing import Any
 from uuid import UUID
 
 from prefect.client.orchestration import get_client
@@ -16,7 +17,7 @@ from prefect.client.schemas.filters import (
     FlowRunFilterState,
     FlowRunFilterStateType,
 )
-from prefect.client.schemas.objects import TERMINAL_STATES, FlowRun
+from prefect.client.schemas.objects import TERMINAL_STATES, FlowRun, StateType
 
 from robojackson.errors import TrainingCrashed
 
@@ -29,6 +30,13 @@ LOOKS = 15
 ends."""
 MOST = 200
 """Runs that the server returns at a time."""
+BULK: Any = "/flow_runs/bulk_set_state"
+"""Route that Prefect's client does not list."""
+MOST_CANCELLED = 50
+"""Runs that it cancels at a time."""
+WAITING = (StateType.SCHEDULED, StateType.PENDING)
+"""States of a run that no worker has begun; the server cancels it at once where none took it."""
+CANCELLED = "the study that waited for it was cancelled"
 log = logging.getLogger(__name__)
 
 
@@ -38,11 +46,14 @@ class RunWatcher:
     def __init__(self) -> None:
         self._waiting: dict[UUID, asyncio.Future[FlowRun]] = {}
         self._asking: asyncio.Task[None] | None = None
+        self._cancelled: set[UUID] = set()
+        self._cancelling: asyncio.Task[None] | None = None
 
     async def of(self, run: FlowRun) -> FlowRun:
         """Return the run as it ended.
 
         Raises:
+            CancelledError: its study is cancelled, and the run as by `cancel`.
             TrainingCrashed: the run was deleted.
             Exception: the server does not answer any more.
         """
@@ -54,8 +65,31 @@ class RunWatcher:
         try:
             last: FlowRun = await ended
             return last
+        except asyncio.CancelledError:
+            await self.cancel(run.id)
+            raise
         finally:
             del self._waiting[run.id]
+
+    async def cancel(self, run_id: UUID) -> None:
+        """Cancel a run, if no worker has begun it, together with others that are cancelled now.
+
+        A server that does not answer is logged: the run stays in its queue.
+        """
+        self._cancelled.add(run_id)
+        if self._cancelling is None or self._cancelling.done():
+            self._cancelling = asyncio.create_task(self._cancel())
+        await asyncio.shield(self._cancelling)
+
+    async def _cancel(self) -> None:
+        await asyncio.sleep(0)  # for the others
+        while self._cancelled:
+            runs = list(self._cancelled)
+            self._cancelled.clear()
+            try:
+                await _cancel_waiting(runs)
+            except Exception as cause:
+                log.warning("%d runs on workers cannot be cancelled: %s", len(runs), cause)
 
     async def _poll(self) -> None:
         """Poll until no run is waited for; a server that is away for a while is polled again."""
@@ -93,6 +127,25 @@ class RunWatcher:
         for waits in self._waiting.values():
             if not waits.done():
                 waits.set_exception(cause)
+
+
+async def _cancel_waiting(runs: list[UUID]) -> None:
+    """Cancel those runs that no worker has begun, all at once: a process that is interrupted has
+    little time."""
+    state = {"type": "CANCELLING", "name": "Cancelling", "message": CANCELLED}
+    async with get_client() as client:
+        parts = [
+            runs[start : start + MOST_CANCELLED] for start in range(0, len(runs), MOST_CANCELLED)
+        ]
+        bodies = [{"flow_runs": _begun_by_none(part), "state": state} for part in parts]
+        await asyncio.gather(*(client.request("POST", BULK, json=body) for body in bodies))
+
+
+def _begun_by_none(runs: list[UUID]) -> dict[str, Any]:
+    """Return the filter of those runs that no worker has begun."""
+    waiting = FlowRunFilterState(type=FlowRunFilterStateType(any_=list(WAITING)))
+    criteria = FlowRunFilter(id=FlowRunFilterId(any_=runs), state=waiting)
+    return criteria.model_dump(mode="json", exclude_unset=True)
 
 
 async def _ended(waiting: list[UUID]) -> list[FlowRun]:

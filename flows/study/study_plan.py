@@ -1,16 +1,18 @@
 """Plan of a study, read and checked before Prefect is imported."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from configs.study_config import Move, Study
+from robojackson.cli.options import yaml_text
 from robojackson.errors import UnreadableVideo
 from robojackson.pipeline.configuration_files import SUFFIXES
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.robot_descriptions import describe_robot
-from robojackson.pipeline.yaml_loader import load
+from robojackson.pipeline.yaml_loader import load, own_values
 from robojackson.rl.config.train_config import TrainConfig
 from robojackson.rl.walkers import STARTS
 from robojackson.robot.description import RobotDescription
@@ -18,9 +20,12 @@ from robojackson.robot.model import load_robot
 from storage.store import Store
 from tasks.runtime.start_networks import local_start_file
 
+log = logging.getLogger(__name__)
+
 
 def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
-    """Return a study of `configs/studies` or of a path, with everything that it names.
+    """Return a study of `configs/studies` or of a path, with everything that it names; one whose
+    file has no name of its own is called as the file.
 
     Raises:
         UnknownName, BadConfiguration: something that it names does not exist or cannot be used.
@@ -29,13 +34,27 @@ def study_of(name: str, overrides: Mapping[str, Any]) -> Study:
     """
     if overrides.get("steps") is not None:
         overrides = {"move_steps": {}, **overrides}  # of all moves
-    study = load(Study, f"studies/{name}" if Path(name).suffix not in SUFFIXES else name, overrides)
+    file = f"studies/{name}" if Path(name).suffix not in SUFFIXES else name
+    if overrides.get("name") is None:
+        overrides = {**overrides, "name": yaml_text(_name_of(file))}
+    study = load(Study, file, overrides)
     robot = describe_robot(study.robot)
     load_robot(robot)
     for move in {*study.moves, *study.move_steps}:
         require_move(move, study.pipeline)
     trainings_of(study, robot)
     return replace(study, robot=robot.file or study.robot)
+
+
+def _name_of(file: str) -> str:
+    """Return the name of a study by its file; a copy that keeps the name of another study would
+    replace the cells and the page of that one."""
+    path = Path(file)
+    stem = path.stem if path.suffix in SUFFIXES else path.name
+    own = str(own_values(file).get("name", stem))
+    if own != stem:
+        log.warning("%s: the name of the study is %s, whose cells and page it replaces", file, own)
+    return own
 
 
 def trainings_of(study: Study, robot: RobotDescription) -> dict[str, TrainConfig]:

@@ -36,6 +36,7 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
 from tasks.evaluate_dance import evaluate_dance
+from tasks.publish_tables import place_of_pass
 from tasks.render_video import render_video
 from tasks.runtime.stage import labelled
 from tasks.train_policy import RunLabels, train_policy
@@ -119,7 +120,8 @@ async def perform(
         else:
             made = await _trained(best, moved, robot, settings, labels, began, tracked)
         folder = "" if tracked is None else tracked.folder
-        return {**made, **write_page(made, labels.move, best.name, shown, folder)}
+        place = _place(Store.from_environment(), made, settings, labels)
+        return {**made, **write_page(made, place, best.name, shown, folder)}
 
 
 def _require_feasible(moved: Artifacts, begin_s: float) -> None:
@@ -160,6 +162,13 @@ async def _trained(
     return made | {"dance": film, "still": draw_snapshot(film), **beside}
 
 
+def _place(
+    store: Store, made: Artifacts, settings: PipelineConfig, labels: RunLabels
+) -> study_tables.Place:
+    tracker = json.loads(store.read(made["evaluation"].key)).get("tracker")
+    return place_of_pass(made, labels, tracker, settings.train.seed)
+
+
 def conclude(
     store: Store,
     made: Artifacts,
@@ -168,22 +177,18 @@ def conclude(
     labels: RunLabels,
 ) -> Facts:
     """Add the pass to the catalogue of runs and the tables, and return its answer."""
-    summary = joined_evaluation(store, made)
-    tracker = summary.get("tracker")
-    setup, seed = (tracker, 0) if tracker else (labels.setup, settings.train.seed)
-    danced = made["evaluation" if tracker else "policy"]
-    run_id = f"{labels.move}-{setup}-s{seed}-{danced.sha256[:8]}"
-    robot = describe_robot(settings.robot).name
-    names = {"run_id": run_id, "move": labels.move, "robot": robot}
+    summary, robot = joined_evaluation(store, made), describe_robot(settings.robot).name
+    place = _place(store, made, settings, labels)
     track = artifact_tables.read(LandmarkTrack, store, made["landmarks"])
     when = datetime.now(UTC)
+    names = {"run_id": place.run_id, "move": place.move, "robot": robot}
     entry = run_catalogue.Run(
-        **names, setup=setup, seed=seed, finished_at=when, artifacts=made, summary=summary
-    )
+        **names, setup=place.setup, seed=place.seed, finished_at=when, artifacts=made,
+        summary=summary,
+    )  # fmt: skip
     run_catalogue.record(store, entry)
     beats = json.loads(store.read(made["beats"].key))["figures"] if "beats" in made else None
     if beats is not None:
-        place = study_tables.Place(study_tables.DANCES, labels.move, setup, seed, run_id)
         rows = [{"robot": robot, "motion": name, **one} for name, one in beats.items()]
         study_tables.write_beats(store, place, rows)
     return {

@@ -22,6 +22,7 @@ from flows.find import best, of_candidate
 from flows.search.dance_source import is_name, resolve
 from robojackson.clips.sources import urls
 from robojackson.clips.video import SUFFIXES, list_videos
+from robojackson.clips.web.file_version import versioned
 from robojackson.clips.web.untrusted_text import web_address
 from robojackson.config import config_dataclass
 from robojackson.pipeline.run_names import run_name, slug_of
@@ -84,7 +85,8 @@ def of_address(address: str, search: Search) -> tuple[str, Artifact]:
         SearchFailed: it cannot be found or downloaded; the message has the reason.
     """
     settings = load(FindConfig, search.config)
-    (candidate,) = urls.search("", address, 1, settings.web, datetime.now(UTC))
+    named = urls.search("", address, 1, settings.web, datetime.now(UTC))
+    (candidate,) = versioned(named, settings.web)
     get_run_logger().info("bringing %s", candidate.url)
     file = Path(candidate.title)
     name = file.stem if file.suffix.lower() in SUFFIXES else name_of(address)

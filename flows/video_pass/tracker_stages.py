@@ -22,6 +22,7 @@ from storage.artifact import Artifact
 from storage.store import Store
 from tasks.draw_pictures import draw_snapshot
 from tasks.evaluate_dance import evaluate_tracker, first_look
+from tasks.publish_tables import place_of_pass
 from tasks.render_video import render_video
 from tasks.runtime.run_logger import run_logger
 from tasks.runtime.stage import identity, is_records_only
@@ -131,9 +132,9 @@ def track(
     look = evaluate_tracker(tracker, reference, robot, first_look(settings.evaluate), labels)
     made = {**best.clip, "stability": best.stability, **moved, **look}
     folder = _folder(made, tracker, robot, settings, labels)
-    page = None
+    page, place = None, place_of_pass(made, labels, tracker.name, 0)
     if not is_records_only():
-        page = write_early_page(made, best.name, shown_with, folder)
+        page = write_early_page(made, place, best.name, shown_with, folder)
     if page is not None:
         run_logger().info(FIRST_PAGE, page)
     announce("video")
@@ -146,7 +147,8 @@ def track(
     whole = evaluate_tracker(tracker, reference, robot, how, labels)
     made |= {**whole, "rollout": look["rollout"], "dance": film, "still": draw_snapshot(film)}
     if page is not None and not settings.instant:  # a training follows, which takes minutes
-        write_early_page(made, best.name, shown_with, folder, again=True)
+        place = place_of_pass(made, labels, tracker.name, 0)
+        write_early_page(made, place, best.name, shown_with, folder, again=True)
     return TrackedDance(tracker, made, folder)
 
 

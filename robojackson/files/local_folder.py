@@ -17,6 +17,8 @@ from typing import Any, Protocol
 CHUNK = 1 << 20
 TEMPORARY = ".part-"
 """Prefix of the names of files that are being written."""
+OF_THE_DISK = "lost+found"
+"""Folder of a file system at its root, which only its administrator may read."""
 FILE = "file://"
 """Before the path of a folder that is given as a URL."""
 
@@ -139,10 +141,12 @@ class LocalFolder:
 
 def files_in(folder: Path, without: Path | None = None) -> Iterator[Path]:
     """Yield the files under a folder, in linked folders too, but for those that lead back; what
-    goes away meanwhile, or may not be read, is left out.
+    goes away meanwhile is left out.
 
     Args:
         without: A folder that is left out wherever it turns up.
+    Raises:
+        PermissionError: a folder may not be read; the message names it.
     """
     yield from _files_in(folder, tuple(_identities(folder, *([without] if without else []))))
 
@@ -150,8 +154,12 @@ def files_in(folder: Path, without: Path | None = None) -> Iterator[Path]:
 def _files_in(folder: Path, left_out: tuple[tuple[int, int], ...]) -> Iterator[Path]:
     try:
         inner = sorted(folder.iterdir())
-    except (FileNotFoundError, NotADirectoryError, PermissionError):
+    except (FileNotFoundError, NotADirectoryError):
         return
+    except PermissionError as cause:
+        if folder.name == OF_THE_DISK:
+            return
+        raise PermissionError(cause.errno, f"{cause.strerror}: {folder}") from cause
     for path in inner:
         if path.is_file():
             yield path

@@ -7,6 +7,7 @@ every string, so the whole process gets a ceiling as well while a query runs.
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from decimal import Decimal
 from threading import Timer
 from typing import TYPE_CHECKING, Any
 
@@ -115,4 +116,17 @@ def _rows(connection: "DuckDBPyConnection", sql: str, given: Given, most: int | 
     found = connection.fetchall() if most is None else connection.fetchmany(most + 1)
     if most is not None and len(found) > most:
         raise BadTable(f"more than {most:,} rows; use LIMIT, or aggregate them")
-    return [dict(zip(names, row, strict=True)) for row in found]
+    return [dict(zip(names, map(_plain, row), strict=True)) for row in found]
+
+
+def _plain(value: object) -> object:
+    """Return a value of DuckDB with its decimals as numbers and its bytes in hexadecimal."""
+    if isinstance(value, Decimal):
+        return int(value) if value == value.to_integral_value() else float(value)
+    if isinstance(value, bytes):
+        return value.hex()
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, dict):
+        return {_plain(key): _plain(inner) for key, inner in value.items()}
+    return value

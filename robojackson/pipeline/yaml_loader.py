@@ -67,6 +67,12 @@ def load(
         raise refusal(cls, cause, where) from cause
 
 
+def own_values(name_or_path: str | Path) -> dict[str, object]:
+    """Return the values of a file alone, without those of a file that it extends; raise as
+    `load`."""
+    return _read(find(name_or_path))
+
+
 def _found(cls: type[Config], name_or_path: str | Path) -> Path:
     """Return the file of a configuration; an unknown name's error lists those of its class."""
     try:

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from robojackson.errors import BackupFailed, StoreError
 from robojackson.files.file_tree import FileTree
+from storage.sqlite_database import SQLite
+from storage.store import Store
+from storage.store_listing import entries
 
 
 @pytest.fixture
@@ -33,3 +37,22 @@ def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path: Path) -> None:
     (tmp_path / "a").chmod(0o640)
     FileTree(tmp_path).write("a", b"y")
     assert mode(tmp_path / "a") == 0o640
+
+
+def test_a_folder_that_may_not_be_read_is_no_empty_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Root may read all folders, so the refusal is made."""
+    store, listed = Store(tmp_path / "store"), Path.iterdir
+    store.put("runs/a.json", b"{}")
+
+    def refused(self: Path) -> Iterator[Path]:
+        if self.name == "runs":
+            raise PermissionError(13, "Permission denied", str(self))
+        return listed(self)
+
+    monkeypatch.setattr(Path, "iterdir", refused)
+    with pytest.raises(StoreError, match=r"cannot list .*: Permission denied: .*runs"):
+        store.list("runs")
+    with pytest.raises(BackupFailed, match=r"cannot list .*: Permission denied: .*runs"):
+        entries(store, SQLite(tmp_path / "absent.db"))

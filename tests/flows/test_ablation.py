@@ -15,12 +15,14 @@ from prefect import State
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
 from prefect.exceptions import ParameterTypeError
-from prefect.states import Completed, Crashed, Failed
+from prefect.states import Completed, Crashed, Failed, Running
 
 from configs.study_config import Setup, Study
 from flows import ablation, cells
+from flows.study import run_watcher
 from robojackson.errors import (
     BadConfiguration,
+    DeploymentFailed,
     RejectedReference,
     StudyFailed,
     TrainingCrashed,
@@ -182,6 +184,21 @@ def test_a_deployment_is_the_study_of_its_name_on_workers(name: str) -> None:
     assert (ours, ours.robot) == (expected, expected.robot)
 
 
+@pytest.mark.medium
+def test_a_study_that_no_worker_can_take_is_refused_before_its_motions(
+    records: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ablation, "motion", lambda *given: pytest.fail("a motion was made"))
+    study = Study(name="played", moves=("walk",), setups=SETUPS, executor="work-pool")
+    with pytest.raises(DeploymentFailed, match="has no deployment cell/pool"):
+        asyncio.run(ablation.ablation(study))
+
+
+@pytest.mark.parametrize("empty", [ValueError(), ValueError(None)], ids=["nothing", "None"])
+def test_an_error_without_a_message_is_reported_by_its_name(empty: Exception) -> None:
+    assert ablation._line(empty) == "ValueError"
+
+
 class Pool:
     """A work pool whose runs end in the states that it is given, one after the other."""
 
@@ -195,7 +212,7 @@ class Pool:
         json.dumps(given["parameters"])
         self.names.append(given["flow_run_name"])
         self.timeouts.append(given["parameters"]["cell"]["timeout_minutes"])
-        return SimpleNamespace(state=self.left.pop(0), total_run_time=self.run_time)
+        return SimpleNamespace(id=0, state=self.left.pop(0), total_run_time=self.run_time)
 
 
 def a_cell(**given: Any) -> Cell:
@@ -225,6 +242,35 @@ def test_a_cell_whose_worker_died_is_given_to_another(monkeypatch: pytest.Monkey
     pool = Pool(Crashed(message="exit -9"), Completed())
     assert on_workers(pool, monkeypatch) == {"policy": REFERENCE}
     assert pool.names == ["scratch-walk-s0"] * 2
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 0.1], ids=["being created", "waiting"])
+def test_a_cancelled_study_cancels_its_cells(
+    moment_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cancelled = AsyncMock()
+
+    class Slow(Pool):
+        async def __call__(self, deployment: str, **given: Any) -> SimpleNamespace:
+            started.append(deployment)
+            await asyncio.sleep(0.05)
+            return SimpleNamespace(id=7, state=Running())
+
+    async def interrupted() -> None:
+        running = asyncio.create_task(cells.run_on_worker(a_cell()))
+        while not started:
+            await asyncio.sleep(0.01)
+        await asyncio.sleep(moment_s)
+        running.cancel()
+        await running
+
+    started: list[str] = []
+    monkeypatch.setattr(cells, "arun_deployment", Slow())
+    monkeypatch.setattr(cells, "is_recorded", lambda cell: False)
+    monkeypatch.setattr(run_watcher, "_cancel_waiting", cancelled)
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(interrupted())
+    cancelled.assert_awaited_once_with([7])
 
 
 def test_a_cell_that_kills_every_worker_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,6 +23,7 @@ from flows.video_pass import dance_stages, scored_candidates
 from flows.video_pass.scored_candidates import Candidate, choose, score_all
 from robojackson.clips.quality.stability import Stability
 from robojackson.errors import NoPersonFound, RejectedReference, UnreadableVideo
+from robojackson.files import tables
 from robojackson.pipeline.pipeline_config import PipelineConfig
 from robojackson.pipeline.yaml_loader import load
 from storage import artifact_tables, run_catalogue, study_tables
@@ -148,6 +149,12 @@ def test_a_renamed_copy_of_the_clip_trains_nothing(passes: Passes) -> None:
     assert passes.executed() == {"write_page": 1}
     shown = Path(result["page"]).read_text()
     assert ("sway.mp4" in shown, "hips.mp4" in shown) == (True, False)
+    named = set()
+    for name, schema in study_tables.CELL.items():
+        table = Path(result["page"]).with_name(f"{name}.parquet")
+        rows = tables.decode_rows(schema, table.read_bytes(), name)
+        named |= {(row["run_id"], row["move"]) for row in rows}
+    assert named == {(result["run_id"], "sway")}
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """A question in SQL ends, and takes no more memory than it may."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,19 @@ def test_tables_may_be_larger_than_the_memory_of_a_question(
         assert ask("SELECT sum(survived_s) AS n FROM episodes") == [{"n": 4e6}]
         with pytest.raises(BadTable, match="takes too much memory; reduce the query"):
             ask("SELECT list(survived_s) AS n FROM episodes")
+
+
+@pytest.mark.parametrize(
+    ("sql", "expected"),
+    [("1.25", 1.25), ("sum(0.5 * range)", 3), ("avg(range)::DECIMAL(4, 2)", 1.5),
+     ("[0.5, 2.0]", [0.5, 2]), ("{'a': 0.5}", {"a": 0.5}), ("'\\x0F\\xA0'::BLOB", "0fa0")],
+)  # fmt: skip
+def test_a_decimal_is_a_number_and_bytes_are_hexadecimal(
+    sql: str, expected: object, tmp_path: Path
+) -> None:
+    (row,) = study_tables.query(Store(tmp_path), f"SELECT {sql} AS x FROM range(4) LIMIT 1")
+    assert json.loads(json.dumps(row)) == {"x": expected}
+    assert type(row["x"]) is type(expected)
 
 
 def test_a_question_without_end_is_interrupted(

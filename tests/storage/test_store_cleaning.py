@@ -1,6 +1,8 @@
 """What `robojackson clean` finds in a store, and what it leaves there."""
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -30,8 +32,6 @@ def store(tmp_path: Path) -> Store:
 
 def recorded(store: Store, name: str, result: object, stage: str = "recover_motion") -> str:
     """Return a record as Prefect writes it: the result is JSON inside JSON."""
-    import json
-
     key = stage_records.address(f"{stage}/{name}")
     store.put(key, json.dumps({"result": stage_records.encode(result).decode()}).encode())
     return key
@@ -55,7 +55,7 @@ def kind_of(store: Store, artifact: Artifact) -> str:
 
 def test_a_result_that_nothing_names_is_unused_and_goes(store: Store) -> None:
     store.save("mocap", "smpl.parquet", b"nobody's")
-    assert [item.kind for item in remove(store, plan(store, USUAL, 0.0))] == ["unused"]
+    assert [item.kind for item in remove(store, plan(store, USUAL, 0.0)).gone] == ["unused"]
     assert keys(store) == set()
 
 
@@ -70,7 +70,7 @@ def test_a_result_that_a_record_names_stays_unless_the_cache_is_named(store: Sto
     made = store.save("mocap", "smpl.parquet", b"a motion")
     record = recorded(store, "a.json", {"smpl": [made]})
     assert kind_of(store, made) == "cache"
-    assert remove(store, plan(store, USUAL, 0.0)) == []
+    assert remove(store, plan(store, USUAL, 0.0)).gone == []
     remove(store, plan(store, ["cache"], 0.0))
     assert not store.exists(made.key)
     assert not store.exists(record)
@@ -110,7 +110,7 @@ def test_gains_of_feedback_are_a_cache(store: Store) -> None:
     gains = store.put(f"{cached_feedback.FOLDER}/0123456789abcdef.npz", b"gains").key
     assert [(item.kind, item.key) for item in inventory(store)] == [("cache", gains)]
     assert not plan(store, USUAL, 0.0).going
-    assert [item.key for item in remove(store, plan(store, ("cache",), 0.0))] == [gains]
+    assert [item.key for item in remove(store, plan(store, ("cache",), 0.0)).gone] == [gains]
     assert keys(store) == set()
 
 
@@ -124,9 +124,67 @@ def test_a_dance_goes_with_its_run_and_what_only_it_names(store: Store) -> None:
     made = store.save("video", "clip.mp4", b"frames")
     store.put("runs/one.json", f'{{"video": "{made.key}"}}'.encode())
     store.put("dances/walk-0123abcd/index.html", b"page")
-    assert remove(store, plan(store, ["unused", "cache"], 0.0)) == []
+    assert remove(store, plan(store, ["unused", "cache"], 0.0)).gone == []
     remove(store, plan(store, ["runs"], 0.0))
     assert keys(store) == set()
+
+
+def test_the_page_of_a_run_that_stays_stays(store: Store) -> None:
+    pages = [store.put(f"dances/{name}/index.html", b"page").key for name in ("räv-1", "old-2")]
+    store.put("runs/old.json", json.dumps({"page": pages[1]}).encode())
+    aged(store, 60)
+    run = store.put("runs/young.json", json.dumps({"page": pages[0]}).encode())
+    remove(store, plan(store, ["runs"], 30 * DAY_S))
+    assert keys(store) == {pages[0], run.key}
+
+
+def unreadable(monkeypatch: pytest.MonkeyPatch, name: str, locked: str) -> None:
+    """Let a method of `Path` fail for a name as for a person without access; root has all."""
+    method = getattr(Path, name)
+
+    def refused(self: Path) -> object:
+        if self.name == locked:
+            raise PermissionError(13, "Permission denied", str(self))
+        return method(self)
+
+    monkeypatch.setattr(Path, name, refused)
+
+
+@pytest.mark.parametrize(("method", "locked"), [("read_bytes", "a.json"), ("iterdir", "records")])
+def test_what_an_unreadable_record_may_name_is_not_offered(
+    method: str, locked: str, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorded(store, "a.json", store.save("mocap", "smpl.parquet", b"a motion"))
+    unreadable(monkeypatch, method, locked)
+    with pytest.raises(StoreError, match=rf"cannot .*{locked}"):
+        plan(store, USUAL, 0.0)
+
+
+def test_a_folder_of_the_disk_itself_is_left_alone(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (Path(store.root) / "lost+found").mkdir()
+    unreadable(monkeypatch, "iterdir", "lost+found")
+    assert plan(store, ALL, 0.0).items == []
+    assert store.list() == []
+
+
+def test_what_cannot_be_removed_is_reported_and_the_rest_goes(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = store.save("mocap", "smpl.parquet", b"kept").key.rpartition("/")[0]
+    gone = store.save("mocap", "smpl.parquet", b"gone").key.rpartition("/")[0]
+    rmtree = shutil.rmtree
+
+    def refused(path: Path) -> None:
+        if path.name in kept:
+            raise PermissionError(13, "Permission denied", str(path))
+        rmtree(path)
+
+    monkeypatch.setattr(shutil, "rmtree", refused)
+    done = remove(store, plan(store, USUAL, 0.0))
+    assert [item.key for item in done.gone] == [gone]
+    assert done.failed == {kept: "Permission denied"}
 
 
 def test_a_download_that_only_its_note_names_is_a_video(store: Store) -> None:
@@ -144,7 +202,7 @@ def test_a_video_goes_with_the_records_of_its_download_and_assessment(
     made = store.save("video", "clip.mp4", b"frames")
     store.put("downloads/youtube/abc/best.json", f'{{"key": "{made.key}"}}'.encode())
     recorded(store, "a.json", {"video": made}, stage)
-    assert remove(store, plan(store, USUAL, 0.0)) == []
+    assert remove(store, plan(store, USUAL, 0.0)).gone == []
     remove(store, plan(store, ["videos"], 0.0))
     assert keys(store) == {"downloads/youtube/abc/best.json"}
 
@@ -156,7 +214,7 @@ def test_a_video_that_more_than_its_download_names_stays_with_its_record(
     made = store.save("video", "clip.mp4", b"frames")
     record = recorded(store, "a.json", made, "download_video")
     store.put(other, f'{{"video": "{made.key}"}}'.encode())
-    assert remove(store, plan(store, ["videos"], 0.0)) == []
+    assert remove(store, plan(store, ["videos"], 0.0)).gone == []
     assert keys(store) == {made.key, record, other}
 
 
@@ -172,9 +230,9 @@ def test_work_that_a_process_holds_stays(lock: str, store: Store) -> None:
     before = plan(store, ["work"], 0.0)
     with locked(folder, lock):
         assert plan(store, ["work"], 0.0).going == []
-        assert remove(store, before) == []  # it was taken up after the plan was made
+        assert remove(store, before).gone == []  # it was taken up after the plan was made
         assert (folder / "checkpoint.zip").exists()
-    assert [item.key for item in remove(store, before)] == ["work/train-1"]
+    assert [item.key for item in remove(store, before).gone] == ["work/train-1"]
     assert not folder.exists()
 
 
@@ -184,7 +242,7 @@ def test_while_a_process_uses_the_store_only_work_goes(
     store.save("mocap", "smpl.parquet", b"nobody's")
     store.work("train-1").joinpath("checkpoint.zip").write_bytes(b"weights")
     monkeypatch.setattr("storage.store_cleaning.users_of", lambda root: ["robojackson dance"])
-    assert {item.kind for item in remove(store, plan(store, USUAL, 0.0))} == {"work"}
+    assert {item.kind for item in remove(store, plan(store, USUAL, 0.0)).gone} == {"work"}
     assert len(keys(store)) == 1
 
 

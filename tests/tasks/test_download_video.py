@@ -15,7 +15,7 @@ from robojackson.errors import TruncatedVideo
 from storage.artifact import Artifact
 from storage.store import Store
 from tasks import download_video as task
-from tasks.download_video import WebVideo, download_video
+from tasks.download_video import WebVideo, download_video, stored_video
 from tests.clips.web.conftest import small_video, web
 from tests.fixtures.web_server import PATIENT, Web
 
@@ -96,3 +96,15 @@ def test_no_id_leaves_the_store(
     outside = {path for path in tmp_path.rglob("*") if store_folder not in (path, *path.parents)}
     assert outside == set()
     assert Store(store_folder).read(made.key) == web.video
+
+
+@pytest.mark.parametrize(
+    ("video_id", "is_it"),
+    [("clip-0123456789ab-89abcdef", True), ("clip-0123456789ab-89abcdef0", False), ("clip", False)],
+)
+def test_without_its_server_any_version_of_a_file_is_found(
+    video_id: str, is_it: bool, web: Web, store_folder: Path
+) -> None:
+    made = bring(web, video_id=video_id)
+    other = WebVideo("generic", "clip-0123456789ab", web.url, "A title")
+    assert stored_video(Store(store_folder), other) == (made if is_it else None)

@@ -7,7 +7,7 @@ id may be `../../x`. What leaves this module fits into one cell of a table and o
 import hashlib
 import re
 import unicodedata
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, urlsplit, urlunsplit
 
 TITLE_LENGTH = 120
 """Characters; the longest title of YouTube has 100."""
@@ -66,8 +66,9 @@ def safe_name(raw: object, address: str = "") -> str:
 
 
 def web_address(raw: object) -> str:
-    """Return an http or https address without control characters, its spaces escaped as browsers
-    do; empty for another one, or one with a space in the name of its host."""
+    """Return an http or https address without control characters, its spaces escaped and the name
+    of its host in ASCII (IDNA) as browsers do; empty for another one, or one with a space in the
+    name of its host."""
     text = "".join(c for c in str(raw or "") if unicodedata.category(c)[0] != "C").strip()
     try:
         parts = urlsplit(text)
@@ -75,9 +76,22 @@ def web_address(raw: object) -> str:
             return ""
         if len(parts.netloc.split()) > 1:
             return ""
+        if not parts.netloc.isascii():
+            text = urlunsplit(parts._replace(netloc=_in_ascii(parts.netloc)))
     except ValueError:
         return ""
     return quote(text, safe=SAFE_IN_URL)
+
+
+def _in_ascii(place: str) -> str:
+    """Return user, host and port of an address with the host as name servers know it.
+
+    Raises:
+        ValueError: there is no such name.
+    """
+    user, at, rest = place.rpartition("@")
+    host, colon, port = rest.partition(":")
+    return f"{user}{at}{host.encode('idna').decode()}{colon}{port}"
 
 
 def in_markdown(text: str) -> str:

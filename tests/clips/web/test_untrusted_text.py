@@ -127,6 +127,18 @@ def test_spaces_of_an_address_are_escaped_and_control_characters_go() -> None:
     assert web_address(raw) == "https://host/a%20b[0m?v=1&x=%C3%A9%C2%A0y%20z"
 
 
+@pytest.mark.parametrize(
+    ("raw", "expected"),
+    [
+        ("https://bücher.example/ä.mp4", "https://xn--bcher-kva.example/%C3%A4.mp4"),
+        ("http://me@例え.jp:8080/a?x=1#b", "http://me@xn--r8jz45g.jp:8080/a?x=1#b"),
+        ("https://" + "ü" * 70 + ".example/", ""),
+    ],
+)
+def test_the_host_of_an_address_is_as_name_servers_know_it(raw: str, expected: str) -> None:
+    assert web_address(raw) == expected
+
+
 def test_an_address_with_a_space_in_its_host_is_none() -> None:
     assert web_address("https://my host/a") == ""
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from storage import store_cleaning
 from storage.store import Store
 from tests.fixtures.commands import Said, in_process
 
@@ -32,6 +33,18 @@ def test_it_removes_when_it_should(word: str, store: Store) -> None:
     result = clean(store, "--older-than", "0", word)
     assert result.out.splitlines()[-1] == "Removed: 1 item, 2.0 MB."
     assert store.list() == []
+
+
+def test_what_cannot_be_removed_is_named_and_fails(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store_cleaning, "_remove", lambda *given: "Permission denied")
+    result = clean(store, "--older-than", "0", "--delete")
+    assert result.code == 1
+    assert "could not be removed: mocap/" in result.out
+    assert result.out.splitlines()[-1] == "Removed: 0 items, 0.0 MB."
+    answer = clean(store, "--older-than", "0", "--delete", "--json").answer
+    assert list(answer["failed"].values()) == ["Permission denied"]
 
 
 def test_what_is_young_stays_by_itself(store: Store) -> None:

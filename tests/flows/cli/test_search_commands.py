@@ -1,9 +1,12 @@
 """The line of `catalogue` before any video is assessed."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from storage import candidate_catalogue
+from storage.store import Store
 from tests.fixtures.commands import in_process
 
 
@@ -22,6 +25,17 @@ def test_a_dance_that_was_never_assessed_says_how_to_look_for_it(tmp_path: Path)
 def test_an_empty_catalogue_is_an_empty_list_for_programs(tmp_path: Path) -> None:
     text = in_process("catalogue", "--json", ROBOJACKSON_STORE=str(tmp_path / "store"))
     assert text.answer == {"candidates": []}
+
+
+def test_the_query_of_a_dance_of_the_book_finds_its_rows(tmp_path: Path) -> None:
+    """`find "APT dance"` records them under the name, APT."""
+    when = datetime(2026, 12, 1, tzinfo=UTC)
+    row = {"run_id": "r", "dance": "APT", "source": "youtube", "video_id": "v", "title": "one"}
+    row |= {"url": "https://host/v", "retrieved_at": when, "decided_at": when}
+    candidate_catalogue.append(Store(tmp_path), [{**row, "decision": "accepted"}])
+    words = ("catalogue", "--dance", "APT dance", "--json")
+    found = in_process(*words, ROBOJACKSON_STORE=str(tmp_path)).answer["candidates"]
+    assert [each["video_id"] for each in found] == ["v"]
 
 
 def test_a_dance_and_a_question_are_refused_together(tmp_path: Path) -> None:

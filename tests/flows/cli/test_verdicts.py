@@ -77,6 +77,13 @@ def test_a_refresh_trains_a_new_video_next() -> None:
     assert result["next"] == "robojackson train store/fresh.parquet -o fresh"
 
 
+def test_a_refresh_into_an_object_store_advises_what_reads_from_it() -> None:
+    done = refreshed(fresh=True)
+    done["dances"]["fresh"]["reference"] = "s3://bucket/store/fresh.parquet"
+    assert refresh_verdict(done)["next"] == "robojackson dance fresh"
+    assert refresh_verdict(done, "g1")["next"] == "robojackson dance fresh --robot g1"
+
+
 def test_a_refresh_that_failed_is_given_again() -> None:
     done = refreshed(a=True) | {"failed": {"b c": "no network"}}
     assert refresh_verdict(done)["next"] == "robojackson refresh 'b c'"

@@ -1,5 +1,6 @@
 """A Prefect server that is not there, or that knows another password, is reported in one line."""
 
+import asyncio
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from configs.dance_book import Dance
 from configs.study_config import Study
 from flows import ablation, dance, find, refresh
 from flows.runtime.deployments import deploy
+from flows.runtime.prefect_server import require_deployment, require_server
 from robojackson.errors import DeploymentFailed
 from robojackson.pipeline.yaml_loader import load
 from tests.fixtures.commands import LOADED, robojackson
@@ -27,11 +29,13 @@ COMMANDS = {
 }
 
 
-class Guarded(BaseHTTPRequestHandler):
-    """A server like Prefect's with a password: without it, only the health check is answered."""
+class Page(BaseHTTPRequestHandler):
+    """A server that has no such page."""
+
+    code = 404
 
     def do_GET(self) -> None:
-        self.send_response(200 if self.path.endswith("/health") else 401)
+        self.send_response(self.code)
         self.send_header("Content-Length", "0")
         self.end_headers()
 
@@ -39,15 +43,33 @@ class Guarded(BaseHTTPRequestHandler):
         """Log nothing."""
 
 
+class Guarded(Page):
+    """A server like Prefect's with a password: without it, only the health check is answered."""
+
+    code = 401
+
+    def do_GET(self) -> None:
+        if self.path.endswith("/health"):
+            self.code = 200
+        super().do_GET()
+
+
+@contextmanager
+def served(handler: type[BaseHTTPRequestHandler]) -> Iterator[str]:
+    """Yield the address of a server without its /api."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
 @pytest.fixture
 def guarded() -> Iterator[str]:
     """Yield the address of a server that refuses us."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Guarded)
-    server.daemon_threads = True
-    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}/api"
-    server.shutdown()
-    server.server_close()
+    with served(Guarded) as address:
+        yield f"{address}/api"
 
 
 @contextmanager
@@ -63,6 +85,22 @@ def test_a_server_that_refuses_us_is_reported_with_what_to_set(
     result = rf"{guarded} refuses us \(401 Unauthorized\); set PREFECT_API_AUTH_STRING"
     with named(guarded), pytest.raises(DeploymentFailed, match=result):
         COMMANDS[name]()
+
+
+def test_an_address_without_its_end_is_reported_with_it() -> None:
+    with served(Page) as address, named(f"{address}/"):
+        expected = (
+            rf"PREFECT_API_URL={address}/ is no address .*: set PREFECT_API_URL={address}/api$"
+        )
+        with pytest.raises(DeploymentFailed, match=expected):
+            require_server()
+
+
+def test_a_deployment_that_a_server_does_not_have_is_reported_with_what_registers_it() -> None:
+    with served(Page) as address, named(f"{address}/api"):
+        expected = "no deployment cell/pool.*robojackson server.*robojackson deploy.*pool training"
+        with pytest.raises(DeploymentFailed, match=expected):
+            asyncio.run(require_deployment("cell/pool"))
 
 
 @pytest.mark.medium

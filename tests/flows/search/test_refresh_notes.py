@@ -39,3 +39,14 @@ def test_a_note_without_a_beginning_counts_by_its_end(store: Store) -> None:
     store.put("refresh/apt.json", json.dumps(facts).encode())
     assert not is_due(store, DANCE, USUAL, NIGHT + timedelta(hours=12))
     assert is_due(store, DANCE, USUAL, NIGHT + timedelta(hours=22))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"started_at": "x"}', '{"started_at": "2999-01-01"}']
+)
+def test_a_dance_whose_note_is_damaged_is_due(
+    text: str, store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    store.put("refresh/apt.json", text.encode())
+    assert is_due(store, DANCE, USUAL, NIGHT)
+    assert "apt.json cannot be read" in caplog.text

@@ -1,12 +1,13 @@
 """The arguments of `find`, before anything is searched."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from configs.dance_book import Dance, DanceBook
 from configs.find_config import FindConfig
 from flows.search import requests
 from flows.search.requests import (
@@ -36,6 +37,28 @@ def test_a_list_of_addresses_needs_no_query(tmp_path: Path) -> None:
 
 def test_a_query_that_the_book_knows_is_that_dance() -> None:
     assert find_dance("apt", "youtube", "", None, FindConfig()).full_query.startswith("APT dance")
+
+
+@pytest.mark.parametrize("words", ["my clips", "clips"])
+@pytest.mark.parametrize(("top", "expected"), [(None, 3), (2, 2)])
+def test_a_dance_of_the_book_is_looked_for_where_the_book_says(
+    words: str, top: int | None, expected: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.mp4").write_text("")
+    named = Dance("My Clips", "clips", top=3, source="folder", address=str(tmp_path))
+    monkeypatch.setattr(requests, "load", lambda *_: DanceBook((named,)))
+    assert find_dance(words, None, "", top, FindConfig()) == replace(named, top=expected)
+
+
+def test_a_dance_of_the_book_may_have_an_address_and_no_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.mp4").write_text("")
+    named = Dance("mine", "", source="folder", address=str(tmp_path))
+    monkeypatch.setattr(requests, "load", lambda *_: DanceBook((named,)))
+    assert find_dance("mine", None, "", None, FindConfig()) == named
+    with pytest.raises(BadConfiguration, match="the query is empty"):
+        find_dance(" ", None, "", None, FindConfig())
 
 
 @pytest.mark.parametrize(("top", "expected"), [(None, ALL), (2, 2)])

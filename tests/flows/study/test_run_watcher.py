@@ -1,6 +1,8 @@
 """Waiting for runs on workers: one question for all of them, and patience with the server."""
 
 import asyncio
+from typing import Any
+from unittest.mock import AsyncMock
 from uuid import UUID, uuid4
 
 import pytest
@@ -8,7 +10,7 @@ from prefect import flow
 from prefect.client.orchestration import get_client
 from prefect.client.schemas.filters import FlowRunFilter
 from prefect.client.schemas.objects import FlowRun
-from prefect.states import Completed, Scheduled
+from prefect.states import Completed, Pending, Running, Scheduled
 
 from flows.study import run_watcher
 from robojackson.errors import TrainingCrashed
@@ -123,6 +125,52 @@ def test_runs_are_looked_up_two_hundred_at_a_time(quick: pytest.MonkeyPatch) -> 
     quick.setattr(run_watcher, "get_client", Client)
     assert asyncio.run(run_watcher._existing(ids)) == set(ids)
     assert requests == [(200, 200), (200, 200), (50, 200)]
+
+
+def test_runs_that_are_cancelled_together_are_one_request(quick: pytest.MonkeyPatch) -> None:
+    """An interrupted command has a second or two."""
+    runs, requests = waiting(5), []
+
+    async def cancelled(ids: list[UUID]) -> None:
+        requests.append(set(ids))
+
+    async def interrupted() -> None:
+        watcher = run_watcher.RunWatcher()
+        together = asyncio.gather(*map(watcher.of, runs), return_exceptions=True)
+        await asyncio.sleep(0.01)
+        together.cancel()
+        await together
+
+    quick.setattr(run_watcher, "_cancel_waiting", cancelled)
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(interrupted())
+    assert requests == [{run.id for run in runs}]
+
+
+def test_a_server_that_is_away_does_not_keep_a_cancelled_study(
+    quick: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    quick.setattr(run_watcher, "_cancel_waiting", AsyncMock(side_effect=ConnectionError("away")))
+    asyncio.run(run_watcher.RunWatcher().cancel(uuid4()))
+    assert "1 runs on workers cannot be cancelled: away" in caplog.text
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("state", "expected"), [(Scheduled, "CANCELLED"), (Pending, "CANCELLING"), (Running, "RUNNING")]
+)
+def test_a_run_is_cancelled_unless_a_worker_has_begun_it(
+    state: Any, expected: str, prefect_server: None
+) -> None:
+    async def cancelled() -> str:
+        async with get_client() as client:
+            run = await client.create_flow_run(flow(lambda: None, name="nothing"), state=state())
+            await run_watcher.RunWatcher().cancel(run.id)
+            ended = await client.read_flow_run(run.id)
+            assert ended.state is not None
+            return ended.state.type.value
+
+    assert asyncio.run(cancelled()) == expected
 
 
 @pytest.mark.medium

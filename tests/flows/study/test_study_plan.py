@@ -65,6 +65,27 @@ def test_a_study_whose_name_has_a_dot_is_found_in_its_folder(
     assert study_of("v1.2", {}).name == "other"
 
 
+@pytest.mark.parametrize("text", ["seeds: [0]\n", "extends: studies/smoke\n"])
+def test_a_study_without_a_name_of_its_own_is_called_as_its_file(
+    text: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its cells and its page would be those of the study `paper`, or of the one it extends."""
+    (tmp_path / "mine.v2.yaml").write_text(text)
+    assert study_of(str(tmp_path / "mine.v2.yaml"), {}).name == "mine.v2"
+    assert study_of(str(tmp_path / "mine.v2.yaml"), {"name": "other"}).name == "other"
+    (tmp_path / "2026.yaml").write_text(text)
+    assert study_of(str(tmp_path / "2026.yaml"), {}).name == "2026"
+    assert caplog.text == ""
+
+
+def test_a_copy_of_a_study_that_keeps_its_name_is_warned_about(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "copy.yaml").write_text("name: paper\nseeds: [0]\n")
+    assert study_of(str(tmp_path / "copy.yaml"), {}).name == "paper"
+    assert "copy.yaml: the name of the study is paper" in caplog.text
+
+
 def test_the_study_of_the_g1_is_scratch_and_walker_on_three_moves_and_five_seeds() -> None:
     expected = load(Study, "studies/g1")
     assert (expected.setups, len(expected.moves), len(expected.seeds)) == (
