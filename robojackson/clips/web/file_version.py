@@ -18,8 +18,9 @@ from robojackson.clips.web.address_guard import public_only
 from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
 
-FACTS = ("ETag", "Last-Modified", "Content-Length")
-"""Headers that change with a file."""
+VERSIONS, LENGTH = ("ETag", "Last-Modified"), "Content-Length"
+"""Headers that change with a file; of the versions the first that is there counts, since some
+servers give the time of the request as that of the change."""
 PATIENCE_S = 5.0
 """Longest silence of a server, seconds."""
 AT_ONCE = 4
@@ -59,6 +60,7 @@ def _facts(url: str, config: WebConfig) -> str:
         ):
             if answer.headers.get_content_type() == "text/html":
                 return ""
-            return "\n".join(f"{n}: {answer.headers[n]}" for n in FACTS if answer.headers[n])
+            versions = [answer.headers[name] for name in VERSIONS if answer.headers[name]]
+            return "\n".join([*versions[:1], *filter(None, [answer.headers[LENGTH]])])
     except (OSError, ValueError, http.client.HTTPException):
         return ""

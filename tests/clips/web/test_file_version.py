@@ -70,6 +70,17 @@ def test_a_replaced_file_is_another_video(
     assert all(SUFFIX.fullmatch(each.video_id.removeprefix("clip-0123456789ab")) for each in found)
 
 
+def test_a_file_with_an_etag_is_the_same_whenever_it_is_asked_for(
+    server: tuple[type[Server], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    handler, address = server
+    found = []
+    for time in ("Tue, 01 Dec 2026", "Wed, 02 Dec 2026"):
+        monkeypatch.setattr(handler, "facts", {"ETag": '"a"', "Last-Modified": time})
+        found += versioned([at(f"{address}/clip.mp4")], PATIENT)
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize(
     ("code", "facts"),
     [(405, {"ETag": '"a"'}), (200, {}), (200, {"ETag": '"a"', "Content-Type": "text/html"})],
