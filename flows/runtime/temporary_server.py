@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from select import select
 from socket import create_server
 
 from robojackson.errors import DeploymentFailed
@@ -87,10 +88,12 @@ class _Server:
         atexit.register(self._end)
 
     def reason(self) -> str:
-        """Return why it has not started; nothing where it lives or was killed."""
-        if self._process.poll() is None:
-            return ""
-        return os.read(self._reason, 4096).decode(errors="replace")
+        """Return why it has not started; nothing where it lives or was killed.
+
+        The reason is there before the socket is closed, and that before the process has ended.
+        """
+        written, _, _ = select([self._reason], [], [], 0.0)
+        return os.read(self._reason, 4096).decode(errors="replace") if written else ""
 
     def _end(self) -> None:
         self._process.terminate()

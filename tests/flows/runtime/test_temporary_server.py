@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from prefect.settings import (
     temporary_settings,
 )
 
+from flows.runtime import temporary_server as temporary_server_module
 from flows.runtime.server_process import reason
 from flows.runtime.temporary_server import temporary_server
 from tests.fixtures.commands import without_server
@@ -65,6 +67,28 @@ def test_a_damaged_database_is_one_line_that_says_where_it_is(tmp_path: Path) ->
     last = done.stderr.splitlines()[-1]
     assert "the temporary Prefect server does not start: sqlalchemy.exc.DatabaseError" in last
     assert f"prefect.db* in {home}" in last
+
+
+def test_the_reason_is_read_while_the_process_still_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a busy machine the socket is closed some time before the process is over."""
+    written = "import os, sys, time; os.write(int(sys.argv[2]), b'no disk'); time.sleep(60)"
+    begin = subprocess.Popen
+
+    def begun(command: list[str], pass_fds: tuple[int, int]) -> "subprocess.Popen[bytes]":
+        line = [command[0], "-c", written, *command[-2:]]
+        return begin(line, pass_fds=pass_fds)
+
+    monkeypatch.setattr(subprocess, "Popen", begun)
+    server = temporary_server_module._Server()
+    try:
+        ends = time.monotonic() + 30.0
+        while not (found := server.reason()) and time.monotonic() < ends:
+            time.sleep(0.02)
+        assert found == "no disk"
+        assert server._process.poll() is None
+        assert server.reason() == ""
+    finally:
+        server._process.kill()
 
 
 def test_a_named_server_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
