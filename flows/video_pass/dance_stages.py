@@ -120,7 +120,8 @@ async def perform(
         else:
             made = await _trained(best, moved, robot, settings, labels, began, tracked)
         folder = "" if tracked is None else tracked.folder
-        place = _place(Store.from_environment(), made, settings, labels)
+        evaluation = json.loads(Store.from_environment().read(made["evaluation"].key))
+        place = place_of_pass(made, labels, evaluation.get("tracker"), settings.train.seed)
         return {**made, **write_page(made, place, best.name, shown, folder)}
 
 
@@ -162,13 +163,6 @@ async def _trained(
     return made | {"dance": film, "still": draw_snapshot(film), **beside}
 
 
-def _place(
-    store: Store, made: Artifacts, settings: PipelineConfig, labels: RunLabels
-) -> study_tables.Place:
-    tracker = json.loads(store.read(made["evaluation"].key)).get("tracker")
-    return place_of_pass(made, labels, tracker, settings.train.seed)
-
-
 def conclude(
     store: Store,
     made: Artifacts,
@@ -178,7 +172,7 @@ def conclude(
 ) -> Facts:
     """Add the pass to the catalogue of runs and the tables, and return its answer."""
     summary, robot = joined_evaluation(store, made), describe_robot(settings.robot).name
-    place = _place(store, made, settings, labels)
+    place = place_of_pass(made, labels, summary.get("tracker"), settings.train.seed)
     track = artifact_tables.read(LandmarkTrack, store, made["landmarks"])
     when = datetime.now(UTC)
     names = {"run_id": place.run_id, "move": place.move, "robot": robot}

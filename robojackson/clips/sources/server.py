@@ -1,13 +1,12 @@
 """A plain HTTP server that lists its files, such as `python -m http.server` or an autoindex."""
 
 import urllib.error
-import urllib.request
 from datetime import datetime
 from html.parser import HTMLParser
 from urllib.parse import unquote, urljoin, urlsplit
 
 from robojackson.clips.video import SUFFIXES
-from robojackson.clips.web.address_guard import public_only
+from robojackson.clips.web.address_guard import opened
 from robojackson.clips.web.untrusted_text import clean_text, safe_name, web_address
 from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
@@ -42,15 +41,8 @@ def search(
 
 def _page(address: str, config: WebConfig) -> tuple[str, str]:
     """Return where a page is, which links are relative to, after redirections; and its text."""
-    handlers = []
-    if config.proxy:
-        handlers.append(urllib.request.ProxyHandler({"http": config.proxy, "https": config.proxy}))
-    opener = urllib.request.build_opener(*handlers)
     try:
-        with (
-            public_only(config.private_addresses, config.proxy),
-            opener.open(address, timeout=config.timeout_s) as answer,
-        ):
+        with opened(address, config.private_addresses, config.proxy, config.timeout_s) as answer:
             return answer.url, bytes(answer.read(LARGEST_PAGE)).decode("utf-8", "replace")
     except (OSError, ValueError) as cause:
         reason = f"HTTP {cause.code}" if isinstance(cause, urllib.error.HTTPError) else cause

@@ -13,6 +13,7 @@ import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from http.client import HTTPResponse
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
@@ -56,6 +57,24 @@ def public_only(allowed: bool, proxy: str | None = None) -> Iterator[None]:
         yield
     finally:
         _trusted.reset(token)
+
+
+@contextmanager
+def opened(
+    address: str | urllib.request.Request, allowed: bool, proxy: str | None, timeout_s: float
+) -> Iterator[HTTPResponse]:
+    """Yield what a server of the web sends, with the guard on.
+
+    Args:
+        allowed, proxy: As of `public_only`.
+        timeout_s: Longest silence of the server, seconds.
+    Raises:
+        OSError, ValueError: it sends nothing; `PrivateAddress` where it is not public.
+    """
+    handlers = [urllib.request.ProxyHandler({"http": proxy, "https": proxy})] if proxy else []
+    opener = urllib.request.build_opener(*handlers)
+    with public_only(allowed, proxy), opener.open(address, timeout=timeout_s) as answer:
+        yield answer
 
 
 def _proxy_hosts(proxy: str | None) -> set[str]:

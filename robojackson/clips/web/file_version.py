@@ -14,7 +14,7 @@ from dataclasses import replace
 from urllib.parse import urlsplit
 
 from robojackson.clips.video import SUFFIXES
-from robojackson.clips.web.address_guard import public_only
+from robojackson.clips.web.address_guard import opened
 from robojackson.clips.web.video_candidate import GENERIC, VideoCandidate
 from robojackson.clips.web.yt_dlp_client import WebConfig
 
@@ -47,17 +47,10 @@ def _versioned(found: VideoCandidate, config: WebConfig) -> VideoCandidate:
 
 def _facts(url: str, config: WebConfig) -> str:
     """Return what a server reports of a file; empty where it reports nothing, or sends a page."""
-    handlers = []
-    if config.proxy:
-        handlers.append(urllib.request.ProxyHandler({"http": config.proxy, "https": config.proxy}))
     request = urllib.request.Request(url, method="HEAD", headers={"User-Agent": "robojackson"})
+    patience_s = min(config.timeout_s, PATIENCE_S)
     try:
-        with (
-            public_only(config.private_addresses, config.proxy),
-            urllib.request.build_opener(*handlers).open(
-                request, timeout=min(config.timeout_s, PATIENCE_S)
-            ) as answer,
-        ):
+        with opened(request, config.private_addresses, config.proxy, patience_s) as answer:
             if answer.headers.get_content_type() == "text/html":
                 return ""
             versions = [answer.headers[name] for name in VERSIONS if answer.headers[name]]
